@@ -23,18 +23,27 @@ until grep -q ready "$dir/ready"; do
     sleep 0.2
 done
 host=${ROBOT_HOST:-0.0.0.0}
-if ! [ -e "$dir/clients" ]; then # one desk is let in, by the code that the log shows; others by docker exec
+serve() {
+    gwrms gateway "$dir/robot.toml" --host "$1" --port "$port" &
+    gateway=$!
+}
+if [ -e "$dir/keys/robot.key" ]; then
+    has_keys=yes
+    serve "$host"
+else # one desk is let in, by the code that the log shows; others by docker exec
+    has_keys=
     gwrms keys pair "$dir/robot.toml" --host "$host" --port "${ROBOT_PAIRING_PORT:-7421}" \
         --name desk --role maintainer --yes &
     pairing=$!
-    until [ -e "$dir/keys/robot.key" ]; do
-        kill -0 "$pairing" 2>/dev/null || exit 1
-        sleep 0.2
-    done
+    serve 127.0.0.1 # the container alone, until there are keys
 fi
-gwrms gateway "$dir/robot.toml" --host "$host" --port "$port" &
-gateway=$!
 while kill -0 "$sim" 2>/dev/null && kill -0 "$gateway" 2>/dev/null; do
+    if [ -z "$has_keys" ] && [ -e "$dir/keys/robot.key" ]; then # made with the first desk, now or later
+        has_keys=yes
+        kill "$gateway"
+        wait "$gateway" || true
+        serve "$host"
+    fi
     sleep 1 &
     wait $! # a signal is heard while it waits, and not while it sleeps
 done

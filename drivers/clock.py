@@ -124,7 +124,7 @@ class DeviceClock:
             self._smallest = (self._device_ns, offset_ns)
 
     def _has_stepped(self, at_ns: int, offset_ns: int) -> bool:
-        """Whether the counter stood still: a whole second in which nothing came near the line.
+        """Return whether the counter stood still: a whole second in which nothing came near the line.
 
         If it was the way that had been slow instead, the first frame that comes sooner corrects the line.
         """

@@ -31,7 +31,7 @@ class Match:
 
 
 def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
-    """Every format (and shipped description) that a serial stream can be in."""
+    """Yield every format (and shipped description) that a serial stream can be in."""
     for name, imu in IMU_FORMATS.items():
         yield name, None, imu.parser
     for name, insole in sorted(INSOLE_FORMATS.items(), key=lambda item: item[1].described):

@@ -48,7 +48,7 @@ class Inbox(Generic[T]):
             raise queue.Empty from None
 
     def empty(self) -> bool:
-        """Whether nothing is in it."""
+        """Return whether nothing is in it."""
         return not self._items
 
     def qsize(self) -> int:

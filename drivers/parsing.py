@@ -110,7 +110,7 @@ class FrameScanner(Generic[F]):
         return []
 
     def _restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
 
     def _length(self, buffer: bytearray, start: int) -> int:
         """Length of the frame that begins at `start` in `buffer`, or `needs(…)`, or IMPOSSIBLE."""
@@ -125,7 +125,7 @@ class FrameScanner(Generic[F]):
         raise NotImplementedError
 
     def _find(self, buffer: bytearray, start: int, end: int) -> int:
-        """Where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
+        """Return where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
         return buffer.find(self.sync, start, end + len(self.sync) - 1)
 
     @property
@@ -198,7 +198,7 @@ class FrameScanner(Generic[F]):
             heappush(self._due, (start + length + behind, _END, start, start + length))
 
     def _may_look_at(self, start: int, end: int) -> bool:
-        """Whether what was looked at leaves room for it."""
+        """Return whether what was looked at leaves room for it."""
         if end > self._paid_to:
             self._granted = min(SAVED, self._granted + GRANT * (end - self._paid_to))
             self._paid_to = end
@@ -255,13 +255,13 @@ class Sequence:
         self.restart()
 
     def restart(self) -> None:
-        """Another stream begins: any number may come first."""
+        """Begin another stream: any number may come first."""
         self._newest: int | None = None
         self._late = 0
         self._late_run = 0
 
     def is_late(self, number: int) -> bool:
-        """Whether the frame is a repetition or older than one before it; counts what `number` shows."""
+        """Return whether the frame is a repetition, or older than one before; counts what `number` shows."""
         if self._newest is None or number == (self._newest + 1) % self._modulus:  # as it mostly is
             self._newest, self._late_run = number, 0
             return False
@@ -320,7 +320,7 @@ class DelimitedParser(Generic[F]):
         return frames
 
     def _restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
 
     def _decode(self, raw: bytes) -> list[F] | None:
         """Return the frames in `raw`, none for a comment.

@@ -144,7 +144,7 @@ def open_port(path: str, baudrate: int) -> serial.Serial:
 
 
 def obstacle(path: str) -> str | None:
-    """Why the port could not be opened now, in words with what to do; it is only looked at."""
+    """Return why the port could not be opened now, in words with what to do; it is only looked at."""
     try:
         kind = Path(path).stat().st_mode
     except OSError as error:

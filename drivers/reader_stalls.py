@@ -31,7 +31,7 @@ class ReaderStalls(FindingState):
         self._row, self._longest_s = 0, 0.0  # of those that follow each other
 
     def closed(self) -> None:
-        """Nobody reads any more, and nobody has to."""
+        """Note that nobody reads any more, and nobody has to."""
         self._passed_ns = None
         self.clear()
 
@@ -49,7 +49,7 @@ class ReaderStalls(FindingState):
         self._passed_ns = now_ns  # last: who reads meanwhile takes it for standing still, not for a silence
 
     def silent_ns(self, since_ns: int, now_ns: int) -> int:
-        """For how long nothing has come since `since_ns`, as far as somebody looked; 0 at least.
+        """Return for how long nothing came since `since_ns`, as far as somebody looked; 0 at least.
 
         What passed until the last standstill's end does not count, up to `EXCUSED_NS`: who stands still again
         and again would never miss anybody. While it stands still all counts: nobody knows then.
@@ -65,11 +65,11 @@ class ReaderStalls(FindingState):
         return self.times + (passed_ns is not None and now_ns - passed_ns > STOOD_NS)
 
     def is_settled(self, now_ns: int) -> bool:
-        """Whether what comes now has not waited, so that its time is its own."""
+        """Return whether what comes now has not waited, so that its time is its own."""
         return now_ns >= self._settled_ns
 
     def is_even(self, now_ns: int) -> bool:
-        """Whether what is sampled now and what was before it have no gap between them, nor just before."""
+        """Return whether there is no gap between this sample and the ones before it, nor just before."""
         return self.gap is None or now_ns - self.gap[1] > EVEN_NS
 
     def explains(self) -> None:
@@ -81,7 +81,7 @@ class ReaderStalls(FindingState):
             )
 
     def words(self, now_ns: int, since_ns: int | None, allowed_s: float) -> str | None:
-        """Why nothing has come since `since_ns`: it stands still, or has just begun anew, with what to check.
+        """Return why nothing came since `since_ns`: it stands still, or has just begun anew; what to check.
 
         `None` where it runs, and where nothing had come for more than `allowed_s` when it stood still: that
         has another cause, however often it stands still since.

@@ -29,7 +29,7 @@ def make_realtime() -> str | None:
 
 @contextlib.contextmanager
 def lent_realtime(thread: int) -> Iterator[None]:
-    """While inside, another thread (by its native id) is urgent too; for who waits for a lock that it has.
+    """Make another thread (by its native id) urgent within the block; for who waits for its lock.
 
     Of one that is urgent anyway, or has ended, or where the system does not allow it, nothing changes.
     """

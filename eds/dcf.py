@@ -239,7 +239,7 @@ def _read_ini(path: Path) -> IniText:
 
 
 def _given(sections: Mapping[str, Mapping[str, str]]) -> Iterator[tuple[str, Key, str]]:
-    """Every value that is not empty: where it stands, whose it is, its text."""
+    """Yield every value that is not empty: where it stands, whose it is, its text."""
     for name, keys in sections.items():
         if match := _OBJECT.fullmatch(name):
             if text := keys.get("parametervalue"):

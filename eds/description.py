@@ -45,7 +45,7 @@ class Description:
     digest: str = ""  # SHA-256 of the file's text
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Whether the file describes this object."""
+        """Return whether the file describes this object."""
         return self.variable(index, subindex) is not None
 
     def variable(self, index: int, subindex: int = 0) -> ODVariable | None:
@@ -60,7 +60,7 @@ class Description:
         return found if members is None or subindex in members else None
 
     def variables(self) -> Iterator[ODVariable]:
-        """Every object and sub-object of the device, by index and sub-index."""
+        """Yield every object and sub-object of the device, by index and sub-index."""
         for index in self.object_dictionary:
             if index < FIRST_OBJECT:
                 continue

@@ -9,7 +9,7 @@ from types import ModuleType
 
 @contextlib.contextmanager
 def without(*names: str) -> Iterator[None]:
-    """While inside, these modules cannot be imported, where they are not there already.
+    """Forbid importing these modules within the block, unless they are there already.
 
     For what is imported only if it is there: asyncio goes without ssl, hashlib has its own digests.
     Afterwards they can be imported again.
@@ -25,7 +25,7 @@ def without(*names: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def standing_in(name: str) -> Iterator[None]:
-    """While inside, importing `name` gives a module whose classes are empty, where it is not there already.
+    """Let importing `name` within the block give a module of empty classes, unless it is there already.
 
     For what a library needs for a part of it that nobody uses: canopen reads an EDS without python-can.
     Afterwards it can be imported itself.

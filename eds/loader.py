@@ -132,7 +132,7 @@ def _imported(text: str) -> bytes:
 
 
 def _add_node_id(variable: ODVariable, node_id: int) -> None:
-    """To what is relative to it."""
+    """Add the node id to what is relative to it."""
     if isinstance(variable.default, int) and NODE_ID in getattr(variable, "default_raw", ""):
         variable.default += node_id
     if isinstance(variable.value, int) and NODE_ID in getattr(variable, "value_raw", ""):

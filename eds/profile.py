@@ -35,7 +35,7 @@ class ProfileObject:
         return f"{self.index:04X}h:{self.subindex}"
 
     def is_in(self, description: Description) -> bool:
-        """Whether the file has it as it should be."""
+        """Return whether the file has it as it should be."""
         variable = description.variable(self.index, self.subindex)
         known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
         return known is not None and known.name == self.type
@@ -65,7 +65,7 @@ class Profile:
     eds: str | None  # the file of such a product that ships
 
     def fits(self, description: Description) -> bool:
-        """Whether it is for the device that this file describes (1018h, CiA 301 §7.5.2.19)."""
+        """Return whether it is for the device of this file (1018h, CiA 301 §7.5.2.19)."""
         if description.vendor_id is None or description.vendor_id != self.vendor_id:
             return False
         if self.products:
@@ -73,7 +73,7 @@ class Profile:
         return self.mark is not None and self.mark.is_in(description)
 
     def found(self, description: Description) -> tuple[Mapping[str, ProfileObject], ...]:
-        """Its quantities and its gains, as far as this device has them."""
+        """Return its quantities and its gains, as far as this device has them."""
         both = (self.quantities, self.gains)
         return tuple({name: one for name, one in some.items() if one.is_in(description)} for some in both)
 
@@ -86,7 +86,7 @@ def profile_of(description: Description) -> Profile | None:
 
 @functools.cache
 def profiles() -> tuple[Profile, ...]:
-    """All that ship, by their files' names."""
+    """Return all that ship, by their files' names."""
     return tuple(_read(path) for path in sorted(FOLDER.glob("*.toml")))
 
 

@@ -88,7 +88,7 @@ def _commissioning(ini: IniText) -> tuple[int | None, dict[str, str]]:
 
 
 def _object_tree(ini: IniText) -> dict[str, set[int]]:
-    """Every object that has a section of its own or of a sub-object, with its sub-indices."""
+    """Return every object that has a section of its own or of a sub-object, with its sub-indices."""
     tree: dict[str, set[int]] = {}
     for name in ini.sections:
         if _OBJECT.fullmatch(name):

@@ -46,7 +46,7 @@ class PdoRow:
 
 
 def object_rows(description: Description) -> Iterator[ObjectRow]:
-    """Every object of the device, by index and sub-index."""
+    """Yield every object of the device, by index and sub-index."""
     for variable in description.variables():
         data_type = DATA_TYPES.get(variable.data_type or 0)
         yield ObjectRow(
@@ -63,7 +63,7 @@ def object_rows(description: Description) -> Iterator[ObjectRow]:
 
 
 def pdo_rows(description: Description) -> Iterator[PdoRow]:
-    """Every PDO that the file describes."""
+    """Yield every PDO that the file describes."""
     for kind, communication, mapping in _PDOS:
         for number in range(512):
             if not description.has(communication + number, 1):
@@ -90,7 +90,7 @@ def axes(description: Description) -> int:
 
 
 def joint_text(description: Description) -> str:
-    """Whether the device can be a joint, and what it lacks."""
+    """Return whether the device can be a joint, and what it lacks, in words."""
     count = axes(description)
     if count:
         return "yes" if count == 1 else f"yes, {count} axes"

@@ -9,7 +9,7 @@ SHIPPED = Path(__file__).parent / "files"
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the files that ship."""
+    """Return names of the files that ship."""
     return _files(SHIPPED)
 
 

@@ -29,7 +29,7 @@ class Standing:
         self._delay_s = AGAIN_S
 
     def begin(self) -> None:
-        """Have it started; it is to be called once."""
+        """Start it; to be called once."""
         self._registry.use(self._name, self._user).add_done_callback(self._began)
 
     def _began(self, module: "Future[Module]") -> None:

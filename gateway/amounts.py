@@ -4,7 +4,7 @@ NONE = "–"
 
 
 def counted(count: int, one: str, more: str = "") -> str:
-    """So many of something, in words."""
+    """Return a number of things, in words."""
     return f"{count} {one if count == 1 else more or f'{one}s'}"
 
 

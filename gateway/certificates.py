@@ -42,7 +42,7 @@ def der_of(pem: bytes) -> bytes:
 
 
 def pem_of(der: bytes) -> bytes:
-    """As it stands in a file."""
+    """Return it as it stands in a file."""
     text = base64.b64encode(der).decode("ascii")
     lines = (text[at : at + 64] for at in range(0, len(text), 64))
     return "\n".join(["-----BEGIN CERTIFICATE-----", *lines, "-----END CERTIFICATE-----", ""]).encode("ascii")

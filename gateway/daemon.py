@@ -158,7 +158,7 @@ class Daemon:
         self._loop.post(self._end)
 
     def end_on_signals(self) -> "contextlib.AbstractContextManager[None]":
-        """While inside, SIGINT and SIGTERM end the daemon. For the main thread only."""
+        """Let SIGINT and SIGTERM end the daemon within the block. For the main thread only."""
         return _signals(self._loop.wake_writer, self.end)
 
     def _open(self, inlet: IncomingBytes) -> None:
@@ -193,7 +193,7 @@ class Daemon:
         self._loop.post(lambda: self._sharing.complain(address, what))
 
     def _watch_over(self, session: Session) -> None:
-        """Whoever is there by a key or account goes as soon as that is taken away."""
+        """Close a client of a key or account as soon as that is taken away."""
         if session.identity is ANYBODY:
             return
         known = self._authentication.known()
@@ -219,7 +219,7 @@ class Daemon:
         self._loop.call_later(WATCH_S, self._look_who_is_known)
 
     def _tidy_after(self, gone: Session) -> None:
-        """Where somebody who moved much has gone, the system soon gets back what that took."""
+        """Give memory back to the system soon after a client that moved much has gone."""
         if gone.received_bytes + gone.sent_bytes >= MUCH_BYTES and not self._tidying:
             self._tidying = True
             self._loop.call_later(TIDY_S, self._tidy)
@@ -231,7 +231,7 @@ class Daemon:
         MemoryLock.give_back()
 
     def _left(self) -> None:
-        """Somebody has gone, or nobody has come yet: `linger_s` from now it may be idle."""
+        """Note that nobody is left, or has come yet: `linger_s` from now it may be idle."""
         if self._idle is not None:
             self._idle.cancel()
         if self._ends_idle:

@@ -32,7 +32,7 @@ _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PA
 
 
 def plainly(error: Exception) -> str:
-    """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
+    """Return it as `ttl_s must be a number, not text`; what is not in the table stays as it is."""
     what, key = _parts(error)
     found = _known(what)
     if found is None:
@@ -47,7 +47,7 @@ def said(error: Exception) -> str:
 
 
 def key_of(error: Exception) -> str:
-    """Where it is, as `rules[0].above`; empty where it is the whole."""
+    """Return the path of the key, as `rules[0].above`; empty for the whole."""
     return _parts(error)[1]
 
 

@@ -86,7 +86,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def _locked(descriptor: int) -> bool:
-    """Whether it is our turn; the lock goes with the descriptor, also where its owner is killed."""
+    """Try to lock, and return whether it is locked; the lock ends with the descriptor, also after a kill."""
     import fcntl
 
     try:
@@ -97,7 +97,7 @@ def _locked(descriptor: int) -> bool:
 
 
 def write_file(file: Path, content: bytes, mode: int) -> None:
-    """There whole, in the place of what was there, or not at all; never readable for more than `mode`."""
+    """Replace the file as a whole, or not at all; it is never readable for more than `mode`."""
     draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
     descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
@@ -114,7 +114,7 @@ def write_file(file: Path, content: bytes, mode: int) -> None:
 
 
 def _new_key() -> bytes:
-    """As PEM."""
+    """Return it as PEM."""
     return run(["ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
 
 

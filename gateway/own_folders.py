@@ -1,8 +1,11 @@
 """Folders that gateway and clients on one computer both know: of a user's settings, and of Unix sockets."""
 
+import contextlib
 import os
+import pwd
 import stat
 from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import Final
 
@@ -19,38 +22,55 @@ def user_folder() -> Path:
 
 
 def given_for_socket(environ: Mapping[str, str]) -> Path | None:
-    """Return the folder that systemd gives a service, or the login a user, for sockets."""
+    """Return the folder for sockets that systemd gives a service, or the login a user."""
     folder = environ.get(_SERVICE) or environ.get(_SESSION)
-    return Path(folder) if folder else None
+    return _ours(Path(folder)) if folder else None
 
 
 def to_serve_in(environ: Mapping[str, str]) -> list[Path]:
-    """Return the folders in which a gateway with keys tries to have its Unix socket, in this order."""
+    """Return the folders in which a gateway with keys tries to have its Unix socket, in this order.
+
+    That of a session comes last: it goes with the logout, and the gateway may stay.
+    """
     if _SERVICE in environ:
-        return [Path(environ[_SERVICE])]
-    system = [SYSTEM] if os.geteuid() == ROOT or os.access(SYSTEM, os.W_OK) else []
-    return [*system, *_of_user(environ, os.geteuid()), user_folder()]
+        return [_ours(Path(environ[_SERVICE]))]
+    user = os.geteuid()
+    system = [SYSTEM] if user == ROOT or os.access(SYSTEM, os.W_OK) else []
+    folders = [*system, user_folder(), *_of_session(environ, user)]
+    return [one for one in folders if not one.exists() or _is_safe(one, {ROOT, user})]
 
 
 def to_look_in(environ: Mapping[str, str]) -> list[Path]:
-    """Return the folders in which a client finds them: none that other users may write to."""
-    users = list(_of_user(environ, os.geteuid()))
-    if os.geteuid() == ROOT and environ.get("SUDO_UID", "").isdecimal():
-        users += _of_user({}, int(environ["SUDO_UID"]))
-    folders = [SYSTEM, *(one if one.name == "gwrms" else one / "gwrms" for one in users), user_folder()]
-    return [one for one in dict.fromkeys(folders) if _is_safe(one)]
+    """Return the folders in which a client finds them: none that other users may write to, or have made."""
+    user = os.geteuid()
+    folders, owners = [SYSTEM, *_of_session(environ, user), user_folder()], {ROOT, user}
+    if user == ROOT and (behind := environ.get("SUDO_UID", "")).isdecimal():
+        owners.add(int(behind))
+        folders += [*_of_session({}, int(behind)), *_settings_of(int(behind))]
+    return [one for one in dict.fromkeys(folders) if _is_safe(one, owners)]
 
 
-def _of_user(environ: Mapping[str, str], uid: int) -> Iterator[Path]:
+def _of_session(environ: Mapping[str, str], uid: int) -> Iterator[Path]:
     """Yield the folder of a session; of `su`, ssh without a login and cron, which name none, too."""
     if environ.get(_SESSION):
-        yield Path(environ[_SESSION])
+        yield _ours(Path(environ[_SESSION]))
     elif (folder := Path(f"/run/user/{uid}")).is_dir():
-        yield folder
+        yield _ours(folder)
 
 
-def _is_safe(folder: Path) -> bool:
+def _settings_of(uid: int) -> Iterator[Path]:
+    with contextlib.suppress(KeyError):
+        yield Path(pwd.getpwuid(uid).pw_dir, ".config", "gwrms")
+
+
+def _ours(folder: Path) -> Path:
+    return folder if folder.name == "gwrms" else folder / "gwrms"
+
+
+def _is_safe(folder: Path, owners: AbstractSet[int]) -> bool:
+    """Return whether nobody but these users made it or may write to it (the system's is a service's)."""
     try:
-        return not folder.stat().st_mode & _OTHERS
+        found = folder.stat()
     except OSError:
         return False
+    return not found.st_mode & _OTHERS and (folder == SYSTEM or found.st_uid in owners)

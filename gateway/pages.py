@@ -8,12 +8,12 @@ _WORKING_COPY: Final = Path(__file__).parents[1] / "docs"
 
 
 def folder() -> Path:
-    """Where the pages are."""
+    """Return the folder of the pages."""
     return _INSTALLED if _INSTALLED.is_dir() else _WORKING_COPY
 
 
 def pages() -> dict[str, Path]:
-    """Every page by its name, such as `how-to/predict`."""
+    """Return every page by its name, such as `how-to/predict`."""
     found = sorted(folder().rglob("*.md"))
     return {str(page.relative_to(folder()).with_suffix("")): page for page in found}
 

@@ -13,7 +13,7 @@ _WRITING: Final = stat.S_IWGRP | stat.S_IWOTH
 
 
 def forbid_core_dumps() -> None:
-    """From now on this process leaves no dump of its memory: it holds a key, or a code that lets in."""
+    """Leave no dump of this process's memory from now on: it holds a key, or a code that lets in."""
     if sys.platform == "win32":
         return  # nothing there writes one
     import resource

@@ -60,7 +60,7 @@ class Streamed(Protocol):
         """Components that are not there, and why."""
 
     def selections(self) -> list[Selection]:
-        """All its channels, by their sources."""
+        """Return all its channels, by their sources."""
 
 
 class Service:
@@ -102,11 +102,11 @@ class Service:
         log.critical("the guard does not run: %s", why)
 
     def close(self) -> None:
-        """When the loop has ended."""
+        """Join the first stop, once the loop has ended."""
         self._first_stop.join()
 
     def objection(self) -> str | None:
-        """Why the gateway must not end now, in words; `None` where it may."""
+        """Return why the gateway must not end now, in words; `None` if it may."""
         guard = self._running_guard()
         return None if guard is None else guard.objection()
 

@@ -170,7 +170,7 @@ class _Spreading:
         return target, value
 
     def _check_counts(self, source: str, joint: str) -> None:
-        """Whether a count is as much of an angle at both."""
+        """Check that a count is as much of an angle at both."""
         here, there = self._angle_of(source), self._angle_of(joint)
         if here is None or there is None:
             raise _Refused("it is in counts, and the robot does not tell how much a count is at both")
@@ -179,7 +179,7 @@ class _Spreading:
 
     @staticmethod
     def _check_way(source: ParameterInfo, target: ParameterInfo, turned: bool | None) -> None:
-        """Whether what can be negative means the same there; a negative scale turns it back."""
+        """Check that a sign means the same there; a negative scale turns it back."""
         if turned is None:
             raise _Refused(_UNKNOWN_WAY)
         if turned != (source.scale * target.scale < 0.0):
@@ -243,12 +243,12 @@ class _Spreading:
             raise _Refused(said)
 
     def _is_turned(self, one: str, other: str) -> bool | None:
-        """Whether the counts of two joints run opposite ways; None where nobody says."""
+        """Return whether the counts of two joints run opposite ways; None if nobody says."""
         here, there = self._angle_of(one), self._angle_of(other)
         return None if here is None or there is None else here.rad_per_count * there.rad_per_count < 0.0
 
     def _are_of_a_kind(self, *joints: str) -> bool:
-        """Whether what their makers filled as they liked is the same: one EDS, or one product."""
+        """Return whether maker-specific objects are the same: one EDS, or one product."""
         parts = (self._parts.get(joint) for joint in joints)
         one, other = (
             part.device if part is not None and isinstance(part.device, dict) else {} for part in parts
@@ -269,7 +269,7 @@ _TURNED: Final = (
 
 
 def _place(address: str) -> Object:
-    """Index and subindex, as of the first axis of a drive."""
+    """Return index and subindex, as of the first axis of a drive."""
     index, _, subindex = address.partition(":")
     number = int(index, 16)
     if FIRST_OF_PROFILE <= number <= LAST_OF_PROFILE:
@@ -278,12 +278,12 @@ def _place(address: str) -> Object:
 
 
 def _has_no_sign(*infos: ParameterInfo) -> bool:
-    """Whether no value of these can be negative."""
+    """Return whether no value of these can be negative."""
     return all(_is_unsigned(one) or (one.min is not None and one.min >= 0) for one in infos)
 
 
 def _is_same_by_name(one: ParameterInfo, other: ParameterInfo) -> bool:
-    """Whether the robot's file calls two objects of different drives alike, in one unit: then they are."""
+    """Return whether the robot's file names two drives' objects alike, in one unit: then they are."""
     swapped = {**_POSITIONS, **_TORQUES}
     return (
         bool(one.unit)

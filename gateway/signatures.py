@@ -25,7 +25,7 @@ def sign(key: Path, message: bytes) -> bytes:
 
 
 def holds(der: bytes, message: bytes, signature: bytes) -> bool:
-    """Whether the key of this certificate has signed the message.
+    """Return whether the key of this certificate has signed the message.
 
     Raises:
         KeyProblem: nobody can say: the certificate is none, or there is no program to do it.

@@ -50,11 +50,11 @@ class Unit:
         return value
 
     def text(self, value: float | None) -> str:
-        """For reading: rounded, without the unit; a dash where there is none."""
+        """Return it for reading: rounded, without the unit; a dash if there is none."""
         return "–" if value is None else rounded(value * self.scale, self.digits)
 
     def brief(self, value: float | None) -> str:
-        """For reading what somebody has set: as `text`, three digits at least, and no zeros at the end."""
+        """Return it for reading what somebody has set: as `text`, three digits at least, no final zeros."""
         if value is None or not math.isfinite(value):
             return "–"
         shown = value * self.scale
@@ -65,7 +65,7 @@ class Unit:
         return text.rstrip("0").rstrip(".") if "." in text else text
 
     def editable(self, value: float) -> str:
-        """For editing: the fewest digits that lead back to exactly this value."""
+        """Return it for editing: the fewest digits that lead back to exactly this value."""
         exact = self.shown(value)
         for precision in range(1, 22):
             short = Context(prec=precision, rounding=ROUND_HALF_EVEN).plus(exact)

@@ -53,7 +53,7 @@ class Course:
             yield self._healthy(60.0)
 
     def _healthy(self, seconds: float) -> Iterator[bool]:
-        """So long, and to the end of the visit under way."""
+        """Walk on for so long, and to the end of the visit under way."""
         end_s = self._robot.clock.now_s + seconds
         while True:
             entry = next(self._ways)

@@ -65,7 +65,7 @@ class Danger:
     sudden: bool = False  # nothing shows before: reported apart
 
     def drawn(self, source: random.Random) -> tuple[str, dict[str, Value]]:
-        """On what, and with which parameters, this time."""
+        """Draw on what, and with which parameters, this time."""
         params: dict[str, Value] = {key: source.uniform(*span) for key, span in self.params.items()}
         return source.choice(self.on), params
 

@@ -82,7 +82,7 @@ class Operator:
         return {"stamp": request["stamp"]}
 
     def _list(self, _request: Request) -> Answer:
-        """Every fault with its keys and where it is on now, and those that are on."""
+        """Return every fault with its keys and where it is on now, and those that are on."""
         active = self._faults.active
         faults = {
             name: fault.facts | {"active": [one.on for one in active if one.name == name]}

@@ -15,7 +15,7 @@ FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
 
 
 def scaled(*steps: Any) -> Pipeline:
-    """Features in standard deviations, none far out; then `steps`."""
+    """Return features in standard deviations, none far out; then `steps`."""
     return make_pipeline(StandardScaler(), FunctionTransformer(within), *steps)
 
 

@@ -10,4 +10,4 @@ class Tell(Protocol):
 
 
 def untold(what: str, done: int, total: int) -> None:
-    """For whoever does not want to know."""
+    """Do nothing, for whoever does not want to know."""

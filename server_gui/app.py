@@ -202,7 +202,7 @@ class App:
             self._gateway.close()
 
     def follow(self, name: str, address: Address) -> Station:
-        """Another robot, from now on."""
+        """Follow another robot from now on."""
         mailbox = Mailbox()
         network = self.feeds.network
         link = CommandLink(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))

@@ -47,7 +47,7 @@ def check(environment: Mapping[str, str] = os.environ) -> None:
 
 
 def can_open(environment: MutableMapping[str, str] = os.environ) -> bool:
-    """Whether the window can be opened here; else the terminal is as good a place."""
+    """Return whether the window can be opened here; else the terminal is as good a place."""
     prefer_x(environment)
     try:
         check(environment)

@@ -20,7 +20,7 @@ FILES: Final[Mapping[str, Callable[[], str]]] = {
 
 
 def stale() -> list[str]:
-    """The files that are not what would be drawn."""
+    """Return the files that are not what would be drawn."""
     return [name for name, draw in FILES.items() if _held(name) != draw()]
 
 

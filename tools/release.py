@@ -60,13 +60,13 @@ def reproduced(epoch_s: int) -> dict[str, bytes]:
 
 
 def sbom(epoch_s: int) -> bytes:
-    """The bill of materials as its file has it."""
+    """Return the bill of materials as its file has it."""
     document = bill(__version__, epoch_s, LOCK.read_text(encoding="utf-8"))
     return json.dumps(document, indent=1).encode("utf-8") + b"\n"
 
 
 def sums(files: Mapping[str, bytes]) -> bytes:
-    """As `sha256sum --check` takes it."""
+    """Return it as `sha256sum --check` takes it."""
     lines = (f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in files.items())
     return "".join(lines).encode("ascii")
 

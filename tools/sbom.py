@@ -33,7 +33,7 @@ class Package:
 
 
 def packages(lock: str) -> list[Package]:
-    """Every package of a lock file as `uv pip compile --generate-hashes` writes it.
+    """Return every package of a lock file as `uv pip compile --generate-hashes` writes it.
 
     Raises:
         ValueError: a line that cannot be read, so that nothing is left out in silence.
@@ -56,7 +56,7 @@ def packages(lock: str) -> list[Package]:
 
 
 def bill(version: str, epoch_s: int, lock: str) -> dict[str, Any]:
-    """The whole document; the same for the same release, whenever and wherever it is made."""
+    """Return the whole document; the same for the same release, whenever and wherever it is made."""
     known = packages(lock)
     own = f"pkg:pypi/{OWN}@{version}"
     return {
@@ -100,6 +100,6 @@ def _component(package: Package) -> dict[str, Any]:
 
 
 def _dependencies(own: str, known: Sequence[Package]) -> Iterator[dict[str, Any]]:
-    """What needs what; of a package with several versions, each needs what any of them does."""
+    """Yield the dependencies of each package; of one with several versions, those of all of them."""
     for name, ref in [(OWN, own), *((package.name, package.purl) for package in known)]:
         yield {"ref": ref, "dependsOn": sorted(package.purl for package in known if name in package.via)}

@@ -146,7 +146,7 @@ def _check_reaction(sdo: SdoChannel, index: int) -> None:
 
 
 def _entries(sdo: SdoChannel) -> dict[int, int]:
-    """Every entry of 1016h by its sub-index: node id << 16 | time in ms."""
+    """Return every entry of 1016h by its sub-index: node id << 16 | time in ms."""
     try:
         count = unsigned(sdo.upload(CONSUMER, 0)[:1])
     except DeviceAbort as error:

@@ -18,7 +18,7 @@ def why_silent(
     unclaimed: Collection[int],
     load_percent: float | None = None,
 ) -> str | None:
-    """Why no SDO is answered, from what is heard else; `None` where the node does talk SDO."""
+    """Return why no SDO is answered, from what else is heard; `None` if the node does talk SDO."""
     no_sdo = f"it answers no SDO on 0x{request_id:03X}: is another SDO client using this channel?"
     if life.nmt_state is NmtState.STOPPED:
         return "it is stopped (NMT) and answers no SDO until its master starts it"

@@ -78,7 +78,7 @@ class Booting:
                 self._booting = self._worker.submit(self._boot, current=self.is_current)
 
     def is_current(self) -> bool:
-        """Whether nothing has overtaken the attempt that is under way."""
+        """Return whether nothing has overtaken the attempt that is under way."""
         return self._booted_generation == self._generation
 
     def _boot(self, sdo: SdoChannel) -> None:

@@ -290,7 +290,7 @@ class CanBus:
                 self._tick(now_ns)
 
     def _counts(self, transport: Transport) -> tuple[int, int, int]:
-        """Frames and data bytes on the bus, and frames that were lost; as far as we know of them."""
+        """Return frames and data bytes on the bus, and frames that were lost; as far as we know of them."""
         carried = transport.carried()
         if carried is None:
             carried = self.frames + self.sent, self._received_bytes + self.sent_bytes

@@ -51,7 +51,7 @@ class _Source:
         return Linear(self.settings.scale, self.settings.offset)
 
     def fits(self, bits: int) -> bool:
-        """Whether so many mapped bits can be its number: a part of it would be another number."""
+        """Return whether so many mapped bits can be its number: a part of it would be another number."""
         return bits == self.type.bits or (self.type.kind == "boolean" and bits > 0)
 
     def value(self, number: float) -> float | None:
@@ -60,7 +60,7 @@ class _Source:
 
 
 def objection(settings: ChannelSettings, description: Description) -> str | None:
-    """Why this device has no such channel, in words; `None` where it can have it."""
+    """Return why this device has no such channel, in words; `None` if it can have it."""
     variable = description.variable(*settings.address)
     if variable is None:
         return f"{description.path.name} has no object {settings.object}"
@@ -101,7 +101,7 @@ class ObjectChannels:
             self._sources.append(_Source(name, channel, settings, variable.data_type or 0))
 
     def __bool__(self) -> bool:
-        """Whether there is anything to read."""
+        """Return whether there is anything to read."""
         return bool(self._sources)
 
     def install(self, tpdos: Sequence[Tpdo]) -> None:

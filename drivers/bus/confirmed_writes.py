@@ -26,7 +26,7 @@ class ConfirmedWrites:
         return None if key in self._unsure else value  # a write may have begun in between
 
     def is_unsure(self, key: Object) -> bool:
-        """Whether it was written, and nobody knows whether the device took it."""
+        """Return whether it was written, and nobody knows whether the device took it."""
         return key in self._unsure
 
     def doubt(self, key: Object) -> None:
@@ -61,7 +61,7 @@ class ConfirmedWrites:
             self._unsure.discard(key)
 
     def leave(self) -> None:
-        """Nobody knows."""
+        """Note that nobody knows."""
         self._before = None
 
     def forget(self) -> None:

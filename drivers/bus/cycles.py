@@ -66,7 +66,7 @@ class Cycles:
 
 
 def next_due(due: float, period_s: float, now: float) -> float:
-    """When a frame that was due is due again: without drift, but what was missed is not made up for.
+    """Return when the next frame is due: without drift, but missed ones are not made up for.
 
     Two SYNCs in a row would move setpoints twice.
     """

@@ -55,7 +55,7 @@ class CanDevice:
         self.forget()
 
     def quality(self, now_ns: int) -> Quality:
-        """By its heartbeat, where it has one; else by whether it answers when it is asked now and then."""
+        """Judge by its heartbeat, if it has one; else by whether it answers when it is asked now and then."""
         age_ms = self.node.life.silent_ms(now_ns)
         problem = self.node.problem(now_ns)
         silence = self.node.silence(now_ns)

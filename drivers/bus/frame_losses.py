@@ -34,7 +34,7 @@ class FrameLosses(FindingState):
         self.stamps.clear()
 
     def excuse(self, began_ns: int, ended_ns: int) -> None:
-        """Nobody read meanwhile, so frames that have no stamp then are not missing; all others are.
+        """Excuse frames without a stamp of a time when nobody read; all others count as missing.
 
         Where stamps lie in between they are the frames' own, as a socket's: then nothing is to be excused.
         """

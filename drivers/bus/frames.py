@@ -54,6 +54,6 @@ class Transport(Protocol):
         """
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
-        """Only these identifiers matter (`None`: all): the interface may keep the others to itself."""
+        """Take only these identifiers (`None`: all): the interface may keep the others to itself."""
 
     def close(self) -> None: ...

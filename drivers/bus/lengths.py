@@ -16,7 +16,7 @@ class Lengths:
         self._odd: list[int] = []  # when they came
 
     def fits(self, stamp_ns: int, length: int) -> bool:
-        """Whether something can be made of a frame that is not of the usual length."""
+        """Return whether something can be made of a frame that is not of the usual length."""
         if not self.usual and length >= self._size:
             self.usual = length
         if self.usual == length:

@@ -114,7 +114,7 @@ class NodeLife:
         return None if last_ns is None else max(0, now_ns - last_ns) / 1e6
 
     def lost(self, now_ns: int) -> bool:
-        """Whether a heartbeat that came, or is asked for, stays away."""
+        """Return whether a heartbeat that came, or is asked for, stays away."""
         if self.timeout_s is None or self.heartbeat_ns is None:
             return False
         return self._standstill.silent_ns(self.heartbeat_ns, now_ns) / 1e9 > self.timeout_s

@@ -56,7 +56,7 @@ class Asking:
         return f"it has answered nothing for {silent_s:.1f} s: check the node's power and cable"
 
     def _unheard_s(self, now_ns: int) -> float:
-        """For how long a node that is probed has said nothing but PDOs; 0 for those with a heartbeat."""
+        """Return for how long a probed node has said nothing but PDOs; 0 for those with a heartbeat."""
         if self._life.timeout_s is not None or not self.probes:
             return 0.0
         return (self._life.silent_ms(now_ns) or 0.0) / 1000

@@ -47,7 +47,7 @@ def read_optional(sdo: SdoChannel, description: Description, index: int, subinde
 
 
 def identity_problem(sdo: SdoChannel, description: Description) -> str | None:
-    """Why a node may be another device than its EDS is for (1018h, CiA 301 §7.5.2.19), in words."""
+    """Return why a node may not be the device of its EDS (1018h, CiA 301 §7.5.2.19), in words."""
     expected = (description.vendor_id, description.product_code)
     problems = []
     for subindex, name, should in zip((1, 2), ("vendor id", "product code"), expected, strict=True):

@@ -68,7 +68,7 @@ class Tpdo:
 
 
 def read_tpdos(sdo: SdoChannel, description: Description) -> tuple[Tpdo, ...]:
-    """Every TPDO that the device has, enabled or not; raises `DriverError`."""
+    """Return every TPDO that the device has, enabled or not; raises `DriverError`."""
     return tuple(
         tpdo for number in _numbers(description) if (tpdo := read_tpdo(sdo, description, number)) is not None
     )

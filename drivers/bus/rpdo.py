@@ -26,7 +26,7 @@ class Rpdo:
     objects: tuple[MappedObject, ...]
 
     def takes_effect(self, *, our_sync: bool) -> bool:
-        """Whether a frame of ours is certain to: at once, or at the next SYNC, which is ours."""
+        """Return whether a frame of ours is certain to act: at once, or at the next SYNC, which is ours."""
         return self.transmission_type in _ASYNCHRONOUS or (
             our_sync and self.transmission_type in _SYNCHRONOUS
         )
@@ -41,7 +41,7 @@ class Rpdo:
 
 
 def find_rpdo(sdo: SdoChannel, description: Description, index: int) -> tuple[Rpdo, ...]:
-    """Every valid RPDO that carries the object `index`; raises `DriverError`."""
+    """Return every valid RPDO that carries the object `index`; raises `DriverError`."""
     return tuple(
         rpdo for rpdo in _read_all(sdo, description) if any(one.index == index for one in rpdo.objects)
     )
@@ -70,5 +70,5 @@ def _read_all(sdo: SdoChannel, description: Description) -> Iterator[Rpdo]:
 
 
 def identifier(cob_id: int) -> int:
-    """As a frame has it, of a PDO's COB-ID (1400h:1, 1800h:1)."""
+    """Return it as a frame has it, of a PDO's COB-ID (1400h:1, 1800h:1)."""
     return cob_id & 0x1FFF_FFFF | EXTENDED if cob_id & EXTENDED_ID else cob_id & 0x7FF

@@ -107,7 +107,7 @@ class Sender:
                 pass
 
     def join(self) -> None:
-        """After `stop`, and after a transport that may block was closed."""
+        """Join the thread: after `stop`, and after a transport that may block was closed."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -130,7 +130,7 @@ class Sender:
         self.offer(can_id, data)()
 
     def send_urgent(self, can_id: int, data: bytes) -> bool:
-        """Whether the frame was taken at once. Else it goes ahead of all others, for `URGENT_S`.
+        """Return whether the frame was taken at once. Else it goes ahead of all others, for `URGENT_S`.
 
         Never blocks and never raises. Where the bus is not open, nothing is sent.
         """
@@ -227,7 +227,7 @@ class Sender:
         return _is_flushed(transport)
 
     def _hand_over(self, transport: Transport, can_id: int, data: bytes) -> bool:
-        """Whether the interface took it; raises `Unavailable`, whatever went wrong."""
+        """Return whether the interface took it; raises `Unavailable`, whatever went wrong."""
         try:
             taken = transport.try_send(can_id, data)
         except Unavailable:
@@ -252,7 +252,7 @@ class Sender:
         return None
 
     def _is_wanted(self, frame: _Frame) -> bool:
-        """Whether it may still leave; who waits for one that may not is told."""
+        """Return whether it may still leave; tell its sender if it may not."""
         try:
             wanted = frame.wanted() and time.monotonic() < frame.until
         except Exception as error:  # noqa: BLE001 - it is its owner's, and nobody else's
@@ -287,7 +287,7 @@ class Sender:
             older.settle(self._overtaken())
 
     def _put_back(self, frame: _Frame, full: str) -> None:
-        """There was no room for it: it is still the first of its queue, unless a newer one stands for it."""
+        """Keep it as the first of its queue, as there was no room, unless a newer one stands for it."""
         if not frame.is_urgent and frame.given_up:
             frame.settle(BusFull(full))
         elif not frame.is_urgent:

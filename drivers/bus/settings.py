@@ -27,7 +27,7 @@ CobId = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
 
 
 def address_of(name: str) -> tuple[int, int]:
-    """Index and subindex of an object's name; the subindex may be more than one can be."""
+    """Return index and subindex of an object's name; the subindex may be more than one can be."""
     index, _, subindex = name.partition(":")
     return int(index, 16), int(subindex, 16 if subindex.startswith("0x") else 10)
 

@@ -12,7 +12,7 @@ from drivers.errors import SettingsError
 
 
 def named(buses: Sequence[str], bitrate: int | None) -> Iterator[tuple[str, CanSettings]]:
-    """Each bus by its name: `can0`, `INTERFACE:CHANNEL` of python-can, or those of a robot's file.
+    """Yield each bus by its name: `can0`, `INTERFACE:CHANNEL` of python-can, or those of a robot's file.
 
     Raises:
         SettingsError: it is no name, or a robot's file has none or cannot be read.

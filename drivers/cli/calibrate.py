@@ -64,8 +64,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        "Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks "
-        "before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a "
+        "Measure the unloaded cells, then known loads on the whole insole; fit, show the fit, and ask "
+        "before writing. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a "
         "port takes everything from [insole.NAME]. A device that sends pressure needs no calibration."
     )
     parser.add_argument(
@@ -84,7 +84,7 @@ def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Names
 
 def _imu_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        "Takes the present posture as upright and writes it. Stand upright and still; name the file in "
+        "Take the present posture as upright, and write it. Stand upright and still; name the file in "
         "[imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], "
         "also for an IMU on a CAN bus."
     )

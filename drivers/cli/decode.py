@@ -30,8 +30,8 @@ Flatten = Callable[[Any], dict[str, object]]
 
 def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. '
-        "Exit status 1 where most bytes belong to no frame of this format."
+        'Print a JSON line per frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. '
+        "Exit status 1 if most bytes belong to no frame of this format."
     )
     parser.add_argument("--format", required=True, choices=FORMATS, help="the sensor's data format")
     parser.add_argument(

@@ -29,10 +29,10 @@ examples:
 DEVICE is a node id (its identity is read by SDO), an identity VENDOR:PRODUCT:REVISION:SERIAL as `find` shows
 it, `new` for the only one without a node id, or `only` for the only device on the bus.
 
-The bus is listened to first. Where a device is operational, or somebody leads the bus, nothing is sent. What
-will happen is told, and asked for. A node id is stored and booted with, then the device is asked for it
-again. A bit rate is stored, and counts from when the device is switched on next; with --activate at once,
-where the device is alone on a bus whose interface is opened with a bit rate (USB adapters; not SocketCAN).
+The command listens to the bus first. If a device is operational, or the bus has a master, nothing is sent.
+Before any change the command shows the plan and asks. A node id is stored and booted with, then queried
+again. A bit rate is stored, and takes effect when the device is next switched on; with --activate at once, if
+the device is alone on a bus whose interface is opened with a bit rate (USB adapters; not SocketCAN).
 """
 WAIT_S = 3.0  # longer than most heartbeats
 AGAIN_S = 1.0  # after the question
@@ -147,7 +147,7 @@ class _Task:
         self.activated: Device | None = None  # which is at another bit rate now
 
     def say(self, text: str) -> None:
-        """For people: on stderr where stdout is for machines."""
+        """Tell people: on stderr if stdout is for machines."""
         stream = sys.stderr if self.options.json else sys.stdout
         stream.write(text + "\n")
         stream.flush()

@@ -36,9 +36,9 @@ class About(msgspec.Struct, frozen=True):
 
 def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        "Records a port's raw bytes, and beside them FILE.json with baud rate, format and duration. Listens "
-        "first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a "
-        "wrong baud rate."
+        "Record a port's raw bytes, and beside them FILE.json with baud rate, format and duration. The "
+        "command listens first, as gwrms sensor does, and records nothing if no format fits: that may be "
+        "noise, at a wrong baud rate."
     )
     parser.add_argument("port", metavar="PORT")
     parser.add_argument("file", metavar="FILE", type=Path)
@@ -54,7 +54,7 @@ def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
 
 def replay_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        "Sends a capture's bytes out of a pseudo-terminal, at the pace at which they were recorded. "
+        "Send a capture's bytes out of a pseudo-terminal, at the pace at which they were recorded. "
         'Prints {"ready": true, "port": …} when it can be opened.'
     )
     parser.add_argument("file", metavar="FILE", type=Path)

@@ -23,11 +23,11 @@ from eds.table import BUS
 MORE = """\
 examples:
   gwrms scan can0                              listen for 3 s: who sends what, who is the master
-  gwrms scan can0 --active --eds ~/eds         then ask every node what it is; which EDS file is for it
+  gwrms scan can0 --active --eds ~/eds         then query every node, and find its EDS file
   gwrms scan robot.toml --active               the buses of a robot's file, whatever else is wrong in it
   gwrms scan --serial /dev/ttyUSB0             what talks on a serial port
 
-Without --active not one frame is sent. With it, nodes that somebody else asks by SDO are left alone, and
+Without --active not one frame is sent. With it, nodes that another client queries by SDO are left alone, and
 nothing is ever written. If the interface is down or its bit rate is wrong, the remedy is shown.
 """
 WAIT_S = 3.0

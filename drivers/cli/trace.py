@@ -121,7 +121,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _by_interface(buses: Iterable[tuple[str, CanSettings]]) -> dict[str, CanSettings]:
-    """By the interface's name, as candump has it; by that of the table where two have the same."""
+    """Return them by the interface's name, as candump has it; by the table's if two have the same."""
     found = list(buses)
     often = Counter(str(settings.channel) for _, settings in found)
     return {

@@ -26,11 +26,11 @@ class TraceContext:
             self.all += self.on(interface)
 
     def names(self, interface: str) -> Mapping[int, str]:
-        """By node id."""
+        """Return the names by node id."""
         return {device.node_id: device.name for device in self.on(interface)}
 
     def _on(self, interface: str) -> Sequence[Device]:
-        """Those of one interface; what `--eds` says counts more than the robot's file."""
+        """Return those of one interface; what `--eds` says counts more than the robot's file."""
         settings = self._buses.get(interface)
         channel = interface or None if settings is None else settings.channel
         found = {} if self._robot is None else {one.node_id: one for one in devices(self._robot, channel)}

@@ -31,7 +31,7 @@ class ImuFrame(msgspec.Struct, frozen=True):
 
 
 def moments(frames: Sequence[ImuFrame]) -> list[ImuFrame]:
-    """Frames that came together, those of one moment made one.
+    """Return frames that came together, those of one moment made one.
 
     A device that tells a moment in several frames sends each kind once: a kind that comes again begins the
     next moment.

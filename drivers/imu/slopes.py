@@ -58,7 +58,7 @@ class SlopePlan:
 
 
 def has_two_axes(description: Description) -> bool:
-    """Whether the device's file knows both slopes in one width."""
+    """Return whether the device's file knows both slopes in one width."""
     return any(all(description.has(index, 0) for index in pair.objects) for pair in PAIRS)
 
 

@@ -40,7 +40,7 @@ def pair(insoles: Sequence[Insole]) -> None:
 
 
 def insoles(settings: Mapping[str, InsoleSettings], folder: Path | None = None) -> list[Insole]:
-    """Those of a wearer, by their names.
+    """Return those of a wearer, by their names.
 
     Raises:
         SettingsError: a layout or calibration is wrong.

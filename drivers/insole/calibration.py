@@ -85,7 +85,7 @@ class Cells:
         )
 
     def saturated(self, counts: Sequence[float | None]) -> bool:
-        """Whether a cell is at its end, so that it may carry more than it says."""
+        """Return whether a cell is at its end, so that it may carry more than it says."""
         return any(
             count is not None and reached is not None and reached(count)
             for count, reached in zip(counts, self._ends, strict=False)
@@ -128,7 +128,7 @@ def _line(cell: CellCalibration) -> tuple[float, float]:
 
 
 def _end(cell: CellCalibration) -> Callable[[float], bool] | None:
-    """Whether a raw count is at the cell's end; `None` for a cell whose end nobody knows."""
+    """Return whether a raw count is at the cell's end, as a function; `None` for an unknown end."""
     rising = loaded_counts(cell)
     ends = [] if cell.saturation is None else [cell.saturation]
     if cell.table:
@@ -140,7 +140,7 @@ def _end(cell: CellCalibration) -> Callable[[float], bool] | None:
 
 
 def _interpolated(table: tuple[tuple[float, float], ...], counts: float) -> float:
-    """Between the table's points; its ends hold beyond them."""
+    """Interpolate between the table's points; its ends hold beyond them."""
     place = bisect.bisect_right(table, counts, key=lambda point: point[0])
     if place == 0:
         return table[0][1]

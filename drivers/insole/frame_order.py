@@ -19,12 +19,12 @@ class Order:
         self._times: dict[Foot | None, Sequence] = {}
 
     def restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
         self._sequences.clear()
         self._times.clear()
 
     def is_late(self, foot: Foot | None, sequence: int | None, ticks: int | None) -> bool:
-        """Whether the frame is a repetition or older than one before it; counts what it shows."""
+        """Return whether the frame is a repetition, or older than one before; counts what it shows."""
         if sequence is not None:
             key = foot if self._each_foot else None
             if key not in self._sequences:

@@ -64,7 +64,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def shipped() -> list[str]:
-    """Names of the layouts that ship, sorted by their number of cells."""
+    """Return names of the layouts that ship, sorted by their number of cells."""
     return sorted(shipped_names(), key=lambda name: (len(load(name).cells), name))
 
 

@@ -35,7 +35,7 @@ class StepDetector:
         self._last_ns = self._landed_ns = 0
 
     def has_landed(self, stamp_ns: int, force: float) -> bool:
-        """Whether this frame shows a landing."""
+        """Return whether this frame shows a landing."""
         fade = min(1.0, (stamp_ns - self._last_ns) / 1e9 / self.PEAK_FADES_S)
         self._peak = max(force, self._peak * (1.0 - fade))
         self._last_ns = stamp_ns
@@ -75,7 +75,7 @@ class FootCheck:
         self._clear_window()
 
     def is_due(self, stamp_ns: int) -> bool:
-        """Whether a frame of this time is one to judge: no more than one each `PERIOD_NS` is."""
+        """Return whether to judge a frame of this time: at most one each `PERIOD_NS` is."""
         return not 0 <= stamp_ns - self._last_ns < PERIOD_NS
 
     def update(self, stamp_ns: int, pressures: Sequence[float | None], force: float | None) -> None:

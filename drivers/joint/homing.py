@@ -96,7 +96,7 @@ class Setup:
     acceleration: int | None = None
 
     def writes(self) -> Iterator[tuple[int, int, bytes]]:
-        """Index, sub-index and data, in their order."""
+        """Yield index, sub-index and data, in their order."""
         yield METHOD, 0, self.method.to_bytes(1, "little", signed=True)
         for index, subindex, value in (
             (SPEEDS, SWITCH, self.switch_speed),
@@ -183,7 +183,7 @@ def leave(axis: Axis, mode: bytes) -> None:
 
 
 def look(axis: Axis) -> AxisReading:
-    """Where it is, and how far. A position beside UNDER_WAY counts from the old zero: it was read before."""
+    """Read position and progress. A position beside UNDER_WAY counts from the old zero: it was read first."""
     position, lag = axis.position(), None
     with suppress(DeviceAbort):
         lag = int.from_bytes(axis.read(FOLLOWING_ERROR, 4), "little", signed=True)

@@ -124,7 +124,7 @@ def _polling_notes(
 
 
 def _lacks(tpdos: tuple[Tpdo, ...]) -> Iterator[str]:
-    """Why no enabled TPDO brings what is wanted."""
+    """Yield why no enabled TPDO brings what is wanted."""
     full = sum(bool(tpdo.enabled and tpdo.objects) for tpdo in tpdos)
     if full:
         yield f"none of its {full} enabled TPDOs carries it"

@@ -131,7 +131,7 @@ class JumpCheck(FindingState):
         self._before = None
 
     def skip(self) -> None:
-        """Nobody has seen how it went since the last time; what was found stays."""
+        """Skip a time in which nobody saw how it went; what was found stays."""
         self._is_across = True
 
     def update(self, now: Motion) -> None:

@@ -81,7 +81,7 @@ class Stopping:
             return
 
     def _look(self, axis: Axis) -> bool:
-        """Whether the bus is open. What does not say that the axis stops is asked again."""
+        """Return whether the bus is open. Any answer but that the axis stops is asked for again."""
         began_ns = time.monotonic_ns()
         try:
             state = axis.state(self._take_patience(axis))

@@ -43,7 +43,7 @@ class Entry:
 
 
 def mappable(description: Description, wanted: Iterable[Quantity]) -> Iterator[Entry]:
-    """Those that may come by themselves, as the EDS says."""
+    """Yield those that may come by themselves, as the EDS says."""
     for one in wanted:
         variable = description.variable(one.index, one.subindex)
         data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
@@ -179,7 +179,7 @@ def _write(sdo: SdoChannel, index: int, subindex: int, value: int, size: int) ->
 
 
 def _takes_timer(sdo: SdoChannel, parameter: int, ms: int) -> bool:
-    """Whether the device sends by a timer; many know the object from their EDS only."""
+    """Return whether the device sends by a timer; many know the object from their EDS only."""
     try:
         _write(sdo, parameter, 5, ms, 2)
     except DeviceAbort:

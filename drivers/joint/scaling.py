@@ -39,7 +39,7 @@ def drive_speed(rad_s: float, counts_per_turn: float, gear_ratio: float, unit: i
 
 
 def scalings(settings: JointSettings, readings: Readings) -> dict[str, Linear | None]:
-    """How each scaled quantity becomes SI; `None` where nobody says how, so that it has no value."""
+    """Return the scaling of each quantity to SI; `None` for an unknown one, which then has no value."""
     rad_per_count = settings.rad_per_count
     rad_per_rpm = settings.direction * math.tau / 60 / settings.gear_ratio
     factor = _RPM.get(settings.velocity_unit)
@@ -65,7 +65,7 @@ def rated_current(settings: JointSettings, readings: Readings) -> float | None:
 
 
 def contradictions(settings: JointSettings, readings: Readings) -> tuple[str, ...]:
-    """Where the configuration and the drive do not say the same, in words."""
+    """Return the contradictions between configuration and drive, in words."""
     found = (check(settings, readings) for check in _CHECKS)
     return tuple(text for text in found if text is not None)
 

@@ -56,7 +56,7 @@ def look(axis: Axis) -> Led:
 
 
 def lead_down(axis: Axis, errand: Errand) -> Led:
-    """To SWITCH ON DISABLED from any state; an axis that drives or brakes comes to rest before."""
+    """Lead to SWITCH ON DISABLED from any state; an axis that drives or brakes comes to rest before."""
     led = _Descent(axis, errand).run()
     if led.state is DriveState.FAULT and led.problem is not None and errand.wanted():
         led = replace(led, problem=f"{led.problem}: {_why_in_fault(axis)}, then reset it again")
@@ -64,7 +64,7 @@ def lead_down(axis: Axis, errand: Errand) -> Led:
 
 
 def _why_in_fault(axis: Axis) -> str:
-    """Its error code in words, and what to do."""
+    """Return its error code in words, and what to do."""
     try:
         code = axis.error_code()
     except DriverError:
@@ -73,7 +73,7 @@ def _why_in_fault(axis: Axis) -> str:
 
 
 def step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
-    """From `origin` to the state that follows it; an axis that is further up already is left as it is."""
+    """Lead from `origin` to the next state; an axis that is further up already is left as it is."""
     if not errand.wanted():
         return Led(None, OVERTAKEN)
     try:

@@ -108,7 +108,7 @@ def _store(master: LssMaster, put_back: Callable[[], object]) -> None:
 
 @contextmanager
 def _selected(master: LssMaster, identity: Identity | None) -> Iterator[None]:
-    """Between these the device is to be configured; nobody is left so, whatever happens."""
+    """Configure the device within the block; nobody is left in configuration, whatever happens."""
     master.release()  # whoever somebody else has left so
     try:
         if identity is None:

@@ -44,7 +44,7 @@ def unconfigured(master: LssMaster) -> list[Identity]:
 
 
 def _identities(master: LssMaster, known: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """Every identity that begins with the numbers that are known."""
+    """Yield every identity that begins with the numbers that are known."""
     part = len(known)
     if part == len(PARTS):
         yield known

@@ -137,7 +137,7 @@ class LssMaster:
         self._single(answers, f"the identity {identity}")
 
     def release(self) -> None:
-        """Nobody is to be configured any more; a device without a node id boots, if it was given one."""
+        """End the configuration of all; a device without a node id boots, if it was given one."""
         self._tell(_SWITCH_ALL, b"\x00")
 
     def matches(self, part: int, number: int, bit: int, then: int) -> bool:
@@ -148,7 +148,7 @@ class LssMaster:
         return self._scan(number, bit, part, then, self.scan_s)
 
     def is_anybody_unconfigured(self) -> bool:
-        """Whether a device without a node id answers, also one that knows no fastscan (it is older)."""
+        """Return whether a device without node id answers, also one that knows no fastscan (it is older)."""
         return bool(self._answers(_IDENTIFY_UNCONFIGURED, b"", _UNCONFIGURED, self._timeout_s))
 
     def begin_scan(self) -> bool:

@@ -30,7 +30,7 @@ class BusSurvey:
         return tuple(sorted(self.traffic.nodes()))
 
     def objections(self) -> Iterator[str]:
-        """Why nothing is to be configured now."""
+        """Yield why nothing is to be configured now."""
         at_work = {node for node, state in self.traffic.states.items() if state is NmtState.OPERATIONAL}
         at_work |= {node for node in self.traffic.nodes() if self.traffic.sends(node)}
         if at_work:
@@ -64,7 +64,7 @@ def listen(bus: CanBus, seconds: float, wait: Callable[[float], object]) -> BusS
 
 
 def is_taken(bus: CanBus, node_id: int, heard: BusSurvey, wait: Callable[[float], object]) -> bool:
-    """Whether a device has this node id: it was heard, or answers an SDO."""
+    """Return whether a device has this node id: it was heard, or answers an SDO."""
     return node_id in heard.nodes or bool(sweep(bus, [node_id], wait))
 
 

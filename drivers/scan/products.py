@@ -22,7 +22,7 @@ class Proposal:
 
 
 def files(folders: Sequence[Path]) -> tuple[Path, ...]:
-    """Every EDS and DCF file in these folders and below, and those that ship; each once."""
+    """Return every EDS and DCF file in these folders and below, and those that ship; each once."""
     found = (
         path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix.lower() in SUFFIXES
     )

@@ -29,7 +29,7 @@ _ERRORS = ("generic", "current", "voltage", "temperature", "communication", "pro
 def as_json(
     settings: CanSettings, found: ScanResult, proposals: Mapping[int, Sequence[Proposal]], bus: str = BUS
 ) -> dict[str, Any]:
-    """For machines: everything that was found. `bus` is what a robot's file calls this one."""
+    """Return everything that was found, for machines. `bus` is what a robot's file calls this one."""
     traffic = found.traffic
     return {
         "bus": {"interface": settings.interface, "channel": settings.channel, "bitrate": settings.bitrate},
@@ -80,7 +80,7 @@ def as_text(
     *,
     active: bool,
 ) -> Iterator[str]:
-    """For people: the bus in a few lines, then node by node, then what to paste into a robot's file."""
+    """Yield it for people: the bus in a few lines, each node, then what to paste into a robot's file."""
     traffic = found.traffic
     load = "" if found.load_percent is None else f" · {found.load_percent:.0f} % of its time"
     errors = f"{found.error_frames} error frames" if found.error_frames else "no error frames"

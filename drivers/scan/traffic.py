@@ -54,19 +54,19 @@ class Traffic:
         return frozenset(node for node in _NODES if any(base + node in self.seen for base in bases))
 
     def asked(self) -> frozenset[int]:
-        """Nodes that somebody asks by SDO."""
+        """Return nodes that somebody asks by SDO."""
         return frozenset(node for node in _NODES if SDO_REQUEST + node in self.seen)
 
     def commanded(self) -> frozenset[int]:
-        """Nodes that somebody sends process data to."""
+        """Return nodes that somebody sends process data to."""
         return frozenset(node for node in _NODES if any(base + node in self.seen for base in RPDOS))
 
     def sends(self, node: int) -> dict[int, IdentifierTraffic]:
-        """Its TPDOs of the predefined connection set, by identifier."""
+        """Return its TPDOs of the predefined connection set, by identifier."""
         return {base + node: self.seen[base + node] for base in TPDOS if base + node in self.seen}
 
     def master(self) -> Iterator[str]:
-        """Why somebody is the bus's master, in words; nothing where nobody is heard to be."""
+        """Yield why a node is the bus's master, in words; nothing if none is heard to be."""
         if (nmt := self.seen.get(NMT)) is not None:
             yield f"NMT commands ({nmt.count})"
         if (sync := self.seen.get(SYNC)) is not None:

@@ -60,7 +60,7 @@ class Device:
         return True
 
     def pdos(self) -> Iterator[Pdo]:
-        """Those that are enabled, and whose mapping is known."""
+        """Yield those that are enabled, and whose mapping is known."""
         for kind, communication, mapping in _PDOS:
             for number in range(_MOST):
                 cob_id = self._numbers.get((communication + number, 1))

@@ -47,7 +47,7 @@ Put = Callable[[Captured], object]
 
 
 def is_file(name: str) -> bool:
-    """Whether a name is that of a recording."""
+    """Return whether a name is that of a recording."""
     return name.endswith(SUFFIXES)
 
 

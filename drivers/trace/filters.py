@@ -14,7 +14,7 @@ _OBJECT = re.compile(r"(?:0x([0-9a-f]{4})|([0-9a-f]{4})h)(?::(?:0x)?([0-9a-f]{1,
 
 
 def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Sequence[Device]]) -> Filter:
-    """Lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`.
+    """Return lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`.
 
     `all_` are the devices that may be named, `on` tells those of an interface.
     """
@@ -48,7 +48,7 @@ def _check(word: str, devices: Sequence[Device]) -> None:
 
 
 def by_kind(words: Sequence[str]) -> Filter:
-    """Lines of these services; raises `SettingsError`."""
+    """Return lines of these services; raises `SettingsError`."""
     names = [name.strip().lower() for word in words for name in word.split(",")]
     unknown = [name for name in names if name not in tuple(FrameKind)]
     if unknown:
@@ -58,7 +58,7 @@ def by_kind(words: Sequence[str]) -> Filter:
 
 
 def by_object(words: Sequence[str]) -> Filter:
-    """Lines about these objects: 0x6041, 6041h:00, or a pattern of their names, as *position*."""
+    """Return lines about these objects: 0x6041, 6041h:00, or a pattern of their names, as *position*."""
     matches = [_matching(word) for word in words]
 
     def wanted(line: DecodedFrame) -> bool:

@@ -18,7 +18,7 @@ Told = Batch | DriverError
 
 
 def merged(buses: Mapping[str, CanSettings], lost: Callable[[int], object]) -> Batches:
-    """Frames of all of these, `HOLD_NS` after they came; by interface, as candump names it.
+    """Return frames of all of these, `HOLD_NS` after they came; by interface, as candump names it.
 
     Raises:
         Unavailable: one of them cannot be opened, or goes.
@@ -47,7 +47,7 @@ def _read(
     told: "queue.Queue[Told]",
     ended: threading.Event,
 ) -> None:
-    """Until the end; what it raises is told."""
+    """Read until the end; an exception is told."""
     batches = live(settings, name, lost)
     try:
         for batch in batches:

@@ -180,7 +180,7 @@ class Conversation:
         return SdoText(f"segment {data[0] & 0x7F} of a block of {{}}", self._object, is_write=self._is_write)
 
     def _acknowledged(self, data: bytes, source: _Blocks) -> SdoText:
-        """So many segments of the block have come; the others are sent again."""
+        """Return that so many segments of the block have come; the others are sent again."""
         kept = data[1]
         complete = kept >= len(self._block) and self._blocks is _Blocks.NONE
         self._data += b"".join(self._block[:kept])
@@ -202,7 +202,7 @@ class Conversation:
         return "an untold number of bytes" if self._announced is None else f"{self._announced} bytes"
 
     def _missing(self) -> SdoText | None:
-        """Where the value that is over now was not heard as a whole."""
+        """Return what is said of a finished value that was not heard as a whole."""
         if self._object is None:
             return SdoText("the end of a transfer whose beginning was not heard")
         if self._announced in (None, len(self._data)):

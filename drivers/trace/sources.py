@@ -54,7 +54,7 @@ def live(settings: CanSettings, interface: str, lost: Callable[[int], object]) -
 
 
 def until(batches: Iterator[Batch], seconds: float | None) -> Iterator[Batch]:
-    """Those of the first `seconds`, by the time of the frames; `None`: all."""
+    """Yield those of the first `seconds`, by the time of the frames; `None`: all."""
     began_ns: int | None = None
     for batch in batches:
         began_ns = batch.now_ns if began_ns is None else began_ns

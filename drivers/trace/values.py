@@ -43,7 +43,7 @@ def label(description: Description | None, index: int, subindex: int) -> str:
 
 
 def value_of(description: Description | None, index: int, subindex: int, data: bytes) -> Value:
-    """Bytes of an object as its EDS has them."""
+    """Return bytes of an object as its EDS has them."""
     variable = None if description is None else description.variable(index, subindex)
     name = None if variable is None else variable.qualname
     known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)

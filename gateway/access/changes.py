@@ -92,7 +92,7 @@ def _publish(waiting: AccessFolder, first: str) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Have what was renamed there outlast a loss of power."""
+    """Make what was renamed there outlast a loss of power."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -122,7 +122,7 @@ def _add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
 
 
 def _ensure_clients(clients: Path) -> None:
-    """For the gateway's account to read, whatever the mask of whoever makes it: nothing there is secret."""
+    """Make the folder, readable for the gateway's account whatever the mask: nothing there is secret."""
     if not clients.exists():
         clients.mkdir(parents=True)
         clients.chmod(0o755)

@@ -61,7 +61,7 @@ class AccessFolder:
             return []
 
     def stamp(self) -> Stamp:
-        """Another one whenever a client or a role has changed."""
+        """Return a stamp, another one whenever a client or a role has changed."""
         return tuple(_stamps((*self.files(), self.table)))
 
 

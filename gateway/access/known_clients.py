@@ -25,7 +25,7 @@ class KnownClients:
     problems: tuple[str, ...]
 
     def knows(self, who: Identity) -> bool:
-        """Whether that is who they still are, with the same role."""
+        """Return whether that is still the same client, with the same role."""
         if who.fingerprint is not None:
             return self.by_key.get(who.fingerprint) == who
         return who.peer is None or identity_of(who.peer, self.table) == who

@@ -132,7 +132,7 @@ class Pairing:
             raise PairingEnded("nobody came in time: the code is void; begin again with a new one")
 
     def _accept(self, visitors: list[_Visitor]) -> None:
-        """Where too many wait, the oldest of the address that most have come from makes room."""
+        """Accept one more; if too many wait, the oldest of the address with the most makes room."""
         connection, address = self._listener.accept()
         if len(visitors) >= _AT_ONCE:
             others = [one for one in visitors if one.thread is not self._winner]

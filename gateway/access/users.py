@@ -53,7 +53,7 @@ def resolved(peer: Peer) -> Peer:
 
 
 def _groups(name: str, gid: int) -> Iterator[str]:
-    """By the computer's own table: a process may have given up groups that its user has."""
+    """Yield groups by the computer's own table: a process may have given up groups of its user."""
     try:
         numbers = os.getgrouplist(name, gid)
     except (KeyError, OSError):

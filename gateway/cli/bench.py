@@ -20,10 +20,10 @@ REQUESTS, SECONDS, RATES_HZ = 200, 5.0, (50.0, 1000.0)
 MOST_WITH_PSUTIL = 200
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
-EPILOG = """It reads and changes nothing. CPU is the gateway's, of one core. Of a request P50 and P99 are how
-long its answer takes; of a stream how old a row is when it is here, right to within half a round
-trip. On the robot itself, psutil reading the same processes in this command is shown for comparison.
-Measure with everything the robot runs, and again without, to see the share of each.
+EPILOG = """It only reads, and changes nothing. CPU is the gateway's, of one core. P50 and P99 of a request
+are the time until its answer; of a stream, the age of a row on arrival, accurate to half a round trip.
+On the robot itself, psutil reading the same processes in this command is shown for comparison.
+Measure with everything that the robot runs, and again without, to see the share of each.
 
 examples:
   gwrms bench
@@ -142,7 +142,7 @@ def _quantiles(values: list[float]) -> tuple[float | None, float | None]:
 
 
 def text(figures: list[Figure]) -> str:
-    """For people."""
+    """Return the figures for people."""
     header = ("", "COUNT", "LOST", "P50", "P99", "CPU A REQUEST", "CPU", "MEMORY")
     rows = [
         (

@@ -20,8 +20,9 @@ EPILOG = """The robot's file names the control loop and its frames:
   period_ms = 10
   late_ms = 2                    # after its time
 
-It is watched only while this runs. LATE is against the frame before; RAN and WAITED are the control loop's
-own time since then: running, and ready to run while others ran. What ended in between cannot be named."""
+The loop is watched only while this command runs. LATE is relative to the frame before; RAN and WAITED are
+the control loop's own time since then: running, and ready to run while others ran. A process that ended in
+between cannot be named."""
 
 _REASONS = {"others_ran": "others ran", "own_work": "its own work", "asleep": "it slept"}
 

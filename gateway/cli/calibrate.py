@@ -44,8 +44,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="gwrms calibrate joint",
         description=(
             "Find a joint's zero again: hold it, without power, as the comment of its zero_offset says, or "
-            "at --angle. Old and new are shown, and written into the robot's file on your word, with a "
-            "comment and an entry of the journal. Nothing is moved. End this robot's gateway first."
+            "at --angle. Old and new zero are shown; once you confirm, the new one is written into the "
+            "robot's file, with a comment and a journal entry. Nothing is moved. End this robot's gateway "
+            "first."
         ),
         allow_abbrev=False,
     )
@@ -105,7 +106,7 @@ def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
 
 
 def _text(file: Path) -> str:
-    """With its own ends of lines."""
+    """Return the file's text with its own ends of lines."""
     return file.read_bytes().decode()
 
 

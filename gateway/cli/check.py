@@ -15,20 +15,20 @@ from gateway.tables.line_numbers import Places
 from gateway.tables.reading import Unreadable, as_far_as_readable, parse, read
 
 _DESCRIPTION = """\
-Checks a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read
-it, and tells everything that is wrong at once: line, table, key, what is allowed and what was likely meant.
-Which of them a file is shows in its tables. Nothing is started, and nothing is written.
+Check a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read
+it, and report all mistakes at once: line, table, key, what is allowed and what was probably meant. The kind
+of a file is recognised by its tables. Nothing is started, and nothing is written.
 
-For a robot's file, its surroundings are checked too: whether EDS files, layouts and calibrations can be used
+For a robot's file, its surroundings are checked too: whether EDS files, layouts and calibrations are usable
 and allow its parameters, whether the ports exist and this user may open them, whether the CAN links are up
 and run at its bit rate, and whether its address is this computer's.
 """
 _EPILOG = """\
-A mistake is what a file is refused for, or, in a file that it names, the component that needs that one: the
-gateway starts without it. A warning is what can work and is likely not what was meant, or what this computer
-lacks: it may come yet. A gateway says the same of its file and of devices' files when it starts, and of ports
-and buses in gwrms describe. Lines that are not TOML are reported, and the rest is checked without them; text
-after an unreadable header, or in a value without an end, cannot be checked.
+For a mistake the file is refused; for one in a file that it names, the gateway starts without the component
+that needs that file. A warning is about something that can work but was probably not meant, or that this
+computer lacks so far. A gateway reports the same about its file and devices' files when it starts, and about
+ports and buses in gwrms describe. Lines that are not TOML are reported, and the rest is checked without them;
+text after an unreadable header, or in a value without an end, cannot be checked.
 
 exit status: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 

@@ -10,7 +10,7 @@ from gateway.tables.finding import Told, mistakes, told
 
 
 def findings(file: Path, tables: Mapping[str, Any], *, machine: bool) -> Iterator[Told]:
-    """All of that; where tables have mistakes, as far as what is right can be looked at."""
+    """Yield all of that; where tables have mistakes, as far as what is right can be looked at."""
     found = examined(file, tables)
     yield from told(found.findings)
     config = found.config or found.rest

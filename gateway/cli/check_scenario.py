@@ -17,7 +17,7 @@ _SCHEMA: Final = "hil_sim.scenario.schema"
 
 
 def findings(file: Path, tables: Mapping[str, Any], *, machine: bool) -> Iterator[Told]:
-    """All of that; the guard is looked at in the robot's file that a run would write."""
+    """Yield all of that; the guard is looked at in the robot's file that a run would write."""
     found: list[Told] = list(import_module(_SCRIPT).findings(file, tables, machine=machine))
     yield from found
     if "guard" in tables and not any(severity == Severity.MISTAKE for severity, *_ in found):

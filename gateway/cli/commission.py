@@ -183,7 +183,7 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 def _all(
     draft: Draft, bench: CanBench, options: argparse.Namespace, face: "Terminal | JsonFace"
 ) -> Talk[bool]:
-    """Whether the file is written."""
+    """Ask for all of it; return whether the file is written."""
     library = Library(files(options.eds))
     yield from commission(draft, bench, library, SerialPorts(), options.serial)
     when = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -27,7 +27,7 @@ class Terminal:
         return self.typed.waits(LOOK_S)
 
     def over(self) -> bool:
-        """Whether a motion has ended since."""
+        """Return whether a motion has ended since."""
         ended, self._shown = self._shown > 0, 0.0
         if ended:
             self.typed.drop()

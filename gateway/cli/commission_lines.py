@@ -82,7 +82,7 @@ class Lines:
         raise EOFError
 
     def waits(self, within_s: float) -> str:
-        """Why nothing is to go on, after so long at most: a line, or that nobody can send one any more."""
+        """Wait at most so long; return why nothing is to go on: a line, or nobody can send one any more."""
         try:
             read = self._read.get(timeout=within_s)
         except queue.Empty:
@@ -218,5 +218,5 @@ class JsonFace:
 
 
 def stdin() -> int:
-    """Where answers come from."""
+    """Return the descriptor that answers come from."""
     return sys.stdin.fileno()

@@ -155,7 +155,7 @@ def choose(argv: list[str], commands: Mapping[str, Callable[[list[str]], int]], 
 
 
 def ask(question: str, *, yes: bool) -> bool:
-    """Whether a person says yes; `yes` where `--yes` said it already.
+    """Return whether a person says yes; `yes` if `--yes` said it already.
 
     Raises:
         NobodyToAsk: there is no terminal.
@@ -170,7 +170,7 @@ def ask(question: str, *, yes: bool) -> bool:
 
 
 def absent_components(description: Description) -> dict[str, str]:
-    """Those that have no channel because something is wrong with them, and what."""
+    """Return those that have no channel because something is wrong with them, and what."""
     there = {channel.component for channel in description.channels}
     return {one.name: one.problem for one in description.components if one.problem and one.name not in there}
 
@@ -180,7 +180,7 @@ def channel_names(description: Description) -> list[str]:
 
 
 def parameter_names(description: Description) -> list[str]:
-    """Every name and address, as in `left_knee.0x6072:0`, that means a parameter."""
+    """Return every name and address, as in `left_knee.0x6072:0`, that means a parameter."""
     parameters = description.parameters
     return [one.name for one in parameters] + [f"{one.component}.{one.object}" for one in parameters]
 

@@ -37,7 +37,7 @@ def main(argv: list[str]) -> int:
 
 
 def text(cost: GatewayCost) -> str:
-    """For people."""
+    """Return the costs for people."""
     facts = "".join(f"{name:<8} {words}\n" for name, words in _facts(cost))
     clients = [_client(one) for one in cost.clients]
     streams = [_stream(one.who, stream) for one in cost.clients for stream in one.streams]

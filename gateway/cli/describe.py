@@ -47,7 +47,7 @@ def main(argv: list[str]) -> int:
 
 
 def _measured(robot: Robot) -> Description:
-    """Its description; where nobody had the buses open before, as soon as their load was measured."""
+    """Return its description; where nobody had the buses open before, as soon as their load was measured."""
     deadline_s = time.monotonic() + LOAD_S
     while True:
         description = robot.describe()
@@ -161,7 +161,7 @@ def _stop(robot: Description) -> str:
 
 
 def _stop_beyond(stop: StopInfo) -> str:
-    """Whether one is held, and what it does beside the drives' quick stop."""
+    """Return whether one is held, and what it does beside the drives' quick stop, in words."""
     lines = [f"a stop is held: {stop.reason or 'no reason given'}" if stop.held else "no stop is held"]
     lines += [] if stop.problem is None else [stop.problem]
     for name, why_not in stop.controllers.items():

@@ -86,7 +86,7 @@ def _emcy(part: ComponentInfo, now_ns: int) -> Iterator[tuple[str, ...]]:
 
 
 def _findings(robot: Description) -> Iterator[tuple[str, FindingInfo]]:
-    """Each once: what is wrong with a node is told of it, and not again of each component on it."""
+    """Yield each once: what is wrong with a node is told of it, and not again of each component on it."""
     told: set[FindingInfo] = set()
     for bus in robot.buses:
         yield from ((bus.name, one) for one in bus.findings)

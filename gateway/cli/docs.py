@@ -6,8 +6,8 @@ from gateway.cli.text import did_you_mean, say, table, warn
 from gateway.pages import find, pages, title
 
 _DESCRIPTION = """\
-Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page's own name
-will do where no other page has it.
+Print a page of the installed documentation; without a name, list all pages. The last part of a page's name is
+enough if no other page has it.
 """
 _EPILOG = """\
 exit status: 0 printed; 1 there is no such page; 2 usage

@@ -111,7 +111,7 @@ def _examined(config: RobotConfig, options: argparse.Namespace) -> int:
 
 
 def _is_here(options: argparse.Namespace) -> bool:
-    """Whether this is the robot's computer."""
+    """Return whether this is the robot's computer."""
     return options.robot is None or options.robot.host in LOOPBACK
 
 

@@ -7,7 +7,7 @@ from gateway.wire.stop import Enabled
 
 EPILOG = """Only where the gateway is the bus's master ([gateway] role = "master"), and while no stop is held.
 All drives make one transition, each confirms it, then the next; before the last one the setpoint is
-made the place where the joint is. Whatever comes in between ends it: what was begun is stopped.
+set to one that moves nothing. Any interruption ends it: drives already affected are stopped.
 
 The joints have torque afterwards: keep the hardware stop within reach.
 

@@ -12,14 +12,15 @@ from gateway.cli.systemd_units import LEAST_LINGER_S, MARK, Service, folder
 from gateway.cli.text import say
 
 _DESCRIPTION = """\
-Writes systemd units for the gateway of CONFIG.
+Write systemd units for the gateway of CONFIG.
 
 Without a [guard] in CONFIG, systemd itself listens, and starts the gateway for the first client;
-linger_s after the last one it ends, and nothing is left of it. A stop that is held, or a write on
-trial, starts it too, at boot and after a kill. With a [guard] it runs from boot on, is watched,
-and is started again if it fails. Write the units again when host, port, records or [guard] change.
+linger_s after the last one the gateway ends, and no process remains. A held stop, or a write on
+trial, also starts it, at boot and after a kill. With a [guard] it runs from boot on, under a
+watchdog, and is restarted if it fails. Write the units again after changing host, port, records
+or [guard].
 
-Nothing is started: the commands that do so are printed.
+Nothing is started; the commands that start it are printed.
 """
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 PRIVATE = (Path("/tmp"), Path("/var/tmp"))  # of the service (PrivateTmp=)

@@ -117,7 +117,7 @@ def _parser(test: str) -> argparse.ArgumentParser:
 
 
 def _motion(parser: argparse.ArgumentParser, kind: JointTestKind) -> None:
-    """How it moves; the defaults are gentle ones."""
+    """Add the arguments of the motion; the defaults are gentle ones."""
     usual = {
         JointTestKind.STEP: (1.0, 10.0),
         JointTestKind.CHIRP: (1.0, 15.0),
@@ -235,7 +235,7 @@ def _records(config: RobotConfig) -> Iterator[Records]:
 
 
 def _folder(folder: Path) -> Path:
-    """There, before anything is asked; raises `SettingsError`."""
+    """Make the folder before anything is asked; raises `SettingsError`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

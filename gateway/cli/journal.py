@@ -21,13 +21,13 @@ from gateway.records.witness import NOBODY, Judgement, WitnessVerdict, judge, ob
 from gateway.wire.control import SignedHead
 
 VERIFY_EPILOG = """Run it on the robot's own computer, or on a copy of journal.jsonl with journal.jsonl.head
-and its older pieces (journal.jsonl.NUMBER) beside it. It says one of
+and its older pieces (journal.jsonl.NUMBER) beside it. The result is one of
 
   intact     every entry is the one that a desk has seen, signed by the robot
-  broken     and at which entry: altered, moved, cut, or another one than a desk has seen
-  unproven   from which entry on: it holds in itself, and nobody else has seen those entries
+  broken     and at which entry: altered, moved, cut, or different from what a desk has seen
+  unproven   from which entry on: consistent in itself, but no desk has seen those entries
 
-Whoever is root on the robot can write whatever they like into what no desk has collected yet.
+Root on the robot can forge any entries that no desk has collected yet.
 
 exit status: 0 intact; 1 broken; 2 not there, or usage; 3 unproven"""
 
@@ -37,8 +37,8 @@ _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previo
 
 USAGE = """usage: gwrms journal COMMAND …
 
-  tail [-n N]    the robot's newest entries: who did what, when, and what came of it
-  verify PATH    whether every entry of a journal's file is there and unaltered, as desks have seen it
+  tail [-n N]    show the robot's newest entries: who did what, when, and the outcome
+  verify PATH    check that every entry of a journal's file is there and unaltered, as desks have seen it
 
 gwrms journal COMMAND --help says more.
 """
@@ -53,8 +53,8 @@ def tail(argv: list[str]) -> int:
     """Run `gwrms journal tail`."""
     made = parser(
         "journal tail",
-        "The newest entries: who did what, when, and what came of it. WHO is known by their key or account\n"
-        "[in brackets]; behind that, the name that the program gives itself, and its address.",
+        "Show the newest entries: who did what, when, and the outcome. WHO is identified by key or account\n"
+        "[in brackets]; after that come the name that the program gives itself, and its address.",
     )
     made.add_argument(
         "-n", type=int, default=20, metavar="N", help="number of entries, at most 1000 (default 20)"
@@ -129,7 +129,7 @@ def _tell(path: Path, found: Judgement) -> None:
 
 
 def _witnesses(arguments: argparse.Namespace) -> tuple[list[SignedHead], list[str]]:
-    """Those that count, and why others do not."""
+    """Return those that count, and why others do not."""
     key, why = _key(arguments)
     heads: list[SignedHead] = []
     problems = list(why)

@@ -25,20 +25,20 @@ from gateway.wire.role import Role
 CONFIG = Path("/etc/gwrms/robot.toml")
 USAGE = """usage: gwrms keys COMMAND …
 
-  pair [CONFIG]          let one more desk in: shows a code, which is typed there
-  list [CONFIG]          who is let in, and as what
-  push HOST… --role ROLE let this desk, or another key, in on further robots, by ssh
-  add [CONFIG] NAME      let a key in whose certificate comes on the standard input
-  revoke [CONFIG] NAME   let somebody in no more; whoever is connected with that key is closed at once
+  pair [CONFIG]          admit another desk: shows a code to type there
+  list [CONFIG]          list the admitted clients, with their roles
+  push HOST… --role ROLE admit this desk, or another key, on further robots, by ssh
+  add [CONFIG] NAME      admit the key whose certificate comes on standard input
+  revoke [CONFIG] NAME   revoke a client; connections with its key are closed at once
 
 CONFIG is the robot's file (default /etc/gwrms/robot.toml); keys and clients are beside it.
 gwrms keys COMMAND --help says more.
 """
 _PAIR = """\
-Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you
-say here how that desk is called and what it may do. With its first desk the robot gets a key of its own: from
-its gateway's next start on, every TCP connection is TLS. Until a desk is admitted nothing changes, even if
-this is cancelled.
+Show HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for the code and proves that it knows it;
+then you enter here the desk's name and its role. With its first desk the robot gets a key of its own: from
+the next start of its gateway on, every TCP connection uses TLS. Until a desk is admitted nothing changes,
+even if you cancel.
 """
 
 
@@ -97,7 +97,7 @@ def pair(argv: list[str]) -> int:
 
 
 def _warn_of_loopback(listener: socket.socket, arguments: argparse.Namespace) -> None:
-    """Before a code is shown that no other desk could use."""
+    """Warn before a code is shown that no other desk could use."""
     if is_loopback(listener.getsockname()):
         warn(
             "keys",
@@ -127,7 +127,7 @@ def _drawn(text: str) -> list[str]:
 
 
 def _address() -> str:
-    """How others reach this computer, as far as it knows itself."""
+    """Return the address by which others reach this computer, as far as it knows it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
         probe.connect(("192.0.2.1", 9))  # nothing is sent (RFC 5737)
         return str(probe.getsockname()[0])

@@ -24,12 +24,12 @@ from gateway.wire.role import Role
 
 REMOTE: Final = "sudo -n gwrms"
 ADD: Final = (
-    "Let a key in whose certificate (PEM) comes on the standard input. gwrms keys push runs this by ssh."
+    "Admit the key whose certificate (PEM) comes on standard input. gwrms keys push runs this by ssh."
 )
 PUSH: Final = """\
-Lets a key in on further robots: runs `gwrms keys add` on each by ssh, as whoever may log in there and use
-sudo. Without --certificate it is this desk's own key, and each robot is pinned here as after pairing: ssh has
-told who it is. A robot that fails is named, and the others are done.
+Admit a key on further robots: runs `gwrms keys add` on each by ssh, with an account that may log in there and
+use sudo. Without --certificate it is this desk's own key, and each robot is pinned here as after pairing,
+because ssh has authenticated it. A robot that fails is named, and the others are done.
 """
 
 
@@ -94,7 +94,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
 
 
 def name_of(text: str) -> str:
-    """For argparse: a name that a client can have."""
+    """Return a name that a client can have, for argparse."""
     if not NAME.fullmatch(text):
         raise argparse.ArgumentTypeError(f"{text!r} is no name: letters, digits, _, . and -, at most 64")
     return text

@@ -27,7 +27,7 @@ class Typed:
         return (line + end).decode(errors="replace")
 
     def waits(self, seconds: float) -> str:
-        """Why nothing is to go on, after so long at most: a key, or that nobody can press one any more."""
+        """Wait at most so long; return why nothing is to go on: a key, or nobody can press one any more."""
         if not self._held and not self._over and self._ready(seconds):
             self._read()
         if self._held:

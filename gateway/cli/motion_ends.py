@@ -58,7 +58,7 @@ class MotionEnded(KeyboardInterrupt):
 
 @contextmanager
 def ending() -> Iterator[None]:
-    """While inside, the first of `ENDS` raises `MotionEnded` in whatever the dialogue does.
+    """Let the first of `ENDS` raise `MotionEnded` within the block, whatever the dialogue does.
 
     The others change nothing: what ends and confirms a motion is not itself interrupted, and has its time.
     """

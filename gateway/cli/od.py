@@ -15,8 +15,8 @@ from gateway.wire.dictionary import ObjectInfo, ObjectList, ObjectValue
 from gateway.wire.limits import OBJECTS_READ
 from gateway.wire.robot import Description
 
-EPILOG = """What is written goes the way of `gwrms set`: only parameters, in their own unit, with the same
-checks, in the journal, read back. An object that is none becomes one by parameters = "eds" and release in
+EPILOG = """--set writes as `gwrms set` does: only parameters, in their own unit, with the same checks, in
+the journal, read back. To make another object a parameter, use parameters = "eds" and release in
 robot.toml.
 
 examples:
@@ -24,9 +24,9 @@ examples:
   gwrms od left_knee 0x6060…             from there on
   gwrms od 2 'target position'           of node 2, by words of the name
   gwrms od left_knee 0x60* --read        with what the device holds now
-  gwrms od left_knee 0x6041 --watch      again each second, where it holds something else
+  gwrms od left_knee 0x6041 --watch      a line for each change, looked for once a second
   gwrms od left_knee 0x6072:0 --set 500
-  gwrms od 5 0x1018 --interface can0 --eds drive.eds   read from the bus itself, where no gateway runs"""
+  gwrms od 5 0x1018 --interface can0 --eds drive.eds   read from the bus itself, without a gateway"""
 
 
 NODES: Final = range(1, 128)

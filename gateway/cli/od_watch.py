@@ -19,7 +19,7 @@ class TooMany(ClientError):
 
 
 def watch(robot: Robot, found: ObjectList, count: int | None, *, as_json: bool) -> int:
-    """Until Ctrl-C, or so many lines; the exit status."""
+    """Watch until Ctrl-C, or so many lines; return the exit status."""
     if found.left_off or len(found.objects) > OBJECTS_READ:
         total = len(found.objects) + found.left_off
         raise TooMany(f"{total} objects are too many to watch, {OBJECTS_READ} at most: search for less")

@@ -13,11 +13,11 @@ from gateway.private import forbid_core_dumps
 from gateway.wire.pairing import is_link, normal
 
 _DESCRIPTION = """\
-Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it
-stands in no list of processes and no shell's history; where this is no terminal, it is a line of the
-standard input. This desk's key is made where it has none, the robot's is pinned in server.toml, and a
-person on the robot says what this desk may do. From then on every command, the window and scripts reach
-the robot by its address, as before.
+Pair this desk with the robot on which `gwrms keys pair` shows a code. The command asks for the code, so
+that it appears in no list of processes and no shell history; without a terminal, it reads the code as a
+line from standard input. It creates a key for this desk if there is none, and pins the robot's key in
+server.toml; a person at the robot decides what this desk may do. From then on every command, the window
+and scripts reach the robot by its address, as before.
 """
 _MOST: Final = 1024  # letters of a line that is typed
 
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
         metavar="CODE",
         nargs="?",
         default="",
-        help="the code, instead of a question; others here may see it",
+        help="the code, instead of asking for it; others on this computer may see it",
     )
     made.add_argument(
         "--name", type=name_of, help="this desk's name on the robot (default: your user and computer)"

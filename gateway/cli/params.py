@@ -30,25 +30,25 @@ from gateway.wire.parameter import PARAMETER_WRITE, ParameterValue, ParameterWri
 USAGE = """\
 usage: gwrms params COMMAND FILE …
 
-  save FILE [GLOB ...]   what the devices hold now, into a file
-  compare FILE           what the file says beside what the robot holds
-  apply FILE             bring the robot to what the file says, all or none; asks before
+  save FILE [GLOB ...]   save the present parameters of the devices
+  compare FILE           compare the file with the robot's parameters
+  apply FILE             set the robot's parameters to those of the file, all or none; asks first
 
 A .toml file holds parameters of a whole robot, a .dcf file (CiA 306) all of one device.
 gwrms params COMMAND --help says more.
 """
 
-SAVE_EPILOG = """A .toml file holds what can be changed, by name, in the units of the robot's file.
-A .dcf file is made from the device's EDS and holds all that the device lets write, but for its commands.
-Exit status 1 where a device did not tell a value: the file is written without it.
+SAVE_EPILOG = """A .toml file contains the changeable parameters, by name, in the units of the robot's file.
+A .dcf file is made from the device's EDS and contains all of its writable objects except commands.
+Exit status 1 if a device did not give a value: the file is written without it.
 
 examples:
   gwrms params save monday.toml
   gwrms params save gait.toml 'gait.*'
   gwrms params save left_knee.dcf --component left_knee --eds my_drive.eds"""
 
-COMPARE_EPILOG = """Values are the same when the device would store the same bytes for both.
-What the file does not name does not count.
+COMPARE_EPILOG = """Values are the same if the device would store the same bytes for both.
+Parameters that the file does not name are ignored.
 
 exit status, as of diff(1)
   0  the robot holds all values of the file
@@ -58,8 +58,8 @@ exit status, as of diff(1)
 example:
   gwrms params compare monday.toml"""
 
-APPLY_EPILOG = """Shows what is different, asks, and writes it all or not at all, read back. Where something
-in the file cannot be brought about, nothing is written.
+APPLY_EPILOG = """Shows the differences, asks, and writes all of them or none, read back. If anything in the
+file cannot be applied, nothing is written.
 
 examples:
   gwrms params apply monday.toml
@@ -139,7 +139,7 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
 
 
 def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
-    """As the devices hold them now, a few at a time."""
+    """Return it as the devices hold them now, a few at a time."""
     held: dict[str, ParameterValue] = {}
     for start in range(0, len(names), _AT_ONCE):
         held |= robot.read(*names[start : start + _AT_ONCE]).values

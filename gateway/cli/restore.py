@@ -3,8 +3,8 @@
 from gateway.cli.connect import ask, connect
 from gateway.cli.storage import device_parser, say_stored
 
-EPILOG = """Refused as gwrms store is. The defaults act after the device's next reset: switch it off
-and on.
+EPILOG = """Refused in the same cases as gwrms store. The defaults take effect after the device's next
+reset: switch it off and on.
 
 example:
   gwrms restore left_knee"""

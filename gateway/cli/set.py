@@ -14,12 +14,11 @@ from gateway.several_joints import all_joints, mirrored, spread
 from gateway.units import unit_named
 from gateway.wire.robot import Description
 
-EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
-reverted if one fails. If somebody else has control, nothing is changed, and the command
-reports it.
+EPILOG = """Either all changes are made or none: they are checked first, written, read back from the devices,
+and reverted if one fails. If somebody else has control, nothing is changed, and the command reports it.
 
 With --trial the robot itself reverts them after that time, and at once when this command ends in any way,
-also with its terminal, computer or network. Enter keeps them.
+for example with its terminal, computer or network. Enter keeps them.
 
 --mirror copies each value to the same joint of the other side, --all-joints to every joint, in the same
 transaction; without =VALUE it copies that joint's present value. Position limits are converted to each

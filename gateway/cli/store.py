@@ -10,9 +10,9 @@ from gateway.cli.text import say, say_json, table
 from gateway.client import CallTimeout, LinkLost, NotConnected, RemoteError, Robot
 from gateway.several_joints import StoreOutcome, refused_or_unknown, storing
 
-EPILOG = """Refused while one of its drives is enabled or in a state that is not known, while something
-is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever
-has changed them, and compared before and after. A write never stores by itself.
+EPILOG = """Refused while one of its drives is enabled or in an unknown state, while something is on trial,
+and if the device does not report that it can store (1010h). All of its parameters are stored, whoever changed
+them, and compared before and after. A write never stores by itself.
 
 With --all every device that can store is asked, one after another, and the outcome of each is printed:
 stored, refused, or not confirmed (the contents of its flash are then unknown). If the link drops, the

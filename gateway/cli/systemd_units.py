@@ -197,7 +197,7 @@ def _readable(given: str, what: str) -> None:
 
 
 def _escaped(path: Path | str) -> str:
-    """As it stands in a unit: a per cent sign begins a specifier."""
+    """Return it as it stands in a unit: a per cent sign begins a specifier."""
     return str(path).replace("%", "%%")
 
 
@@ -208,7 +208,7 @@ def _quoted(word: str) -> str:
 
 
 def folder(*, of_user: bool) -> Path:
-    """Where units are installed."""
+    """Return the folder of the units."""
     if not of_user:
         return Path("/etc/systemd/system")
     given = os.environ.get("XDG_CONFIG_HOME")

@@ -74,6 +74,6 @@ def budget(info: BudgetInfo) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Names that come close to one that does not exist, as the end of a sentence."""
+    """Return names that come close to one that does not exist, as the end of a sentence."""
     close = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     return f"; did you mean {' or '.join(close)}?" if close else ""

@@ -49,13 +49,13 @@ def _take_back(robot: Robot, written: Written) -> str:
 
 
 def _ended(error: RemoteError, written: Written) -> str:
-    """How the robot ended it, by the names of what was tried: a write's number says nothing to a person."""
+    """Return how the robot ended it, by parameters' names: a write's number says nothing to a person."""
     how = str(error).partition(" is not on trial: ")[2] or str(error)
     return f"{', '.join(written.before)}: {how}"
 
 
 def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:
-    """Whether it is to be kept. Without anybody to ask, its time runs out."""
+    """Return whether it is to be kept. Without anybody to ask, its time runs out."""
     asking = [sys.stdin]
     while (left := ends - time.monotonic()) > 0:
         if countdown:

@@ -29,9 +29,9 @@ Row = tuple[int, str | None, dict[str, float | None]]  # its stamp, that in UTC,
 MIN_WIDTH = 12
 FIRST_VALUE_S = 3
 
-EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
-robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock, and
---csv is as gwrms sessions export writes it. Rows that were lost on the way are said on stderr. Ctrl-C ends
+EPILOG = """A missing or stale value is shown as a dash (null with --json), never as the old number. Time is
+the robot's, in seconds since the first line; --json and --csv also give it as UTC, by the robot's own clock,
+and --csv has the format of gwrms sessions export. Rows lost on the way are reported on stderr. Ctrl-C ends
 it.
 
 examples:

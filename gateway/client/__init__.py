@@ -9,6 +9,7 @@ from gateway.client.blocking import Robot
 from gateway.client.client import Client
 from gateway.client.clock import ClockOffset
 from gateway.client.errors import (
+    NOTHING_SENT,
     BadAddress,
     CallTimeout,
     ClientError,
@@ -24,6 +25,7 @@ from gateway.client.link import ConnectionState, LinkSettings
 from gateway.client.subscription import Batch, StreamCounters, Subscription
 
 __all__ = [
+    "NOTHING_SENT",
     "Address",
     "BadAddress",
     "Batch",

@@ -101,7 +101,7 @@ def context_for(address: Address, pin: str) -> "ssl.SSLContext":
 
 
 def check_pin(address: Address, pin: str, der: bytes | None) -> None:
-    """Before a byte is said: raises `WrongRobot` where another one answers than was paired."""
+    """Check before a byte is said: raises `WrongRobot` if another one answers than was paired."""
     found = fingerprint(der) if der else None
     if found == pin.lower():
         return

@@ -15,16 +15,15 @@ from gateway.client.backoff import Backoff
 from gateway.client.clock import ClockTracker
 from gateway.client.connection import UNREADABLE, Connection
 from gateway.client.errors import (
+    NOTHING_SENT,
     CallTimeout,
     ClientError,
     LinkLost,
     NotConnected,
     ProtocolError,
     RemoteError,
-    Unreachable,
-    WrongRobot,
 )
-from gateway.client.local_sockets import listens_at, local_sockets
+from gateway.client.local_sockets import listens_at, local_sockets, sockets_instead
 from gateway.client.subscription import Subscription
 from gateway.wire.framing import PROTOCOL
 from gateway.wire.method import Method, P, Params, R
@@ -62,6 +61,7 @@ class LinkSettings:
 
 
 OnState = Callable[[ConnectionState], None]
+_Greeted = tuple[Connection, Hello]
 AGAIN_S: Final = 0.05  # the least between two attempts, however often somebody dials
 DIAL_S: Final = 1.0  # that a stop waits for a connection at most
 
@@ -118,8 +118,12 @@ class Link:
         """
         while self.state in (ConnectionState.IDLE, ConnectionState.CONNECTING):
             await self._next_change()
-        if self.state is not ConnectionState.CONNECTED and self.problem is not None:
-            raise self.problem
+        problem = self.problem
+        if self.state is ConnectionState.CONNECTED or problem is None:
+            return
+        if isinstance(problem, (NotConnected, LinkLost)):
+            raise type(problem)(f"{problem}{sockets_instead(self.address)}") from problem
+        raise problem
 
     async def connected(self) -> Hello:
         """Wait for a connection, for as long as it takes.
@@ -153,8 +157,7 @@ class Link:
         if method.urgent:
             await self._dial()
         if self._connection is None:
-            why = f" ({self.problem})" if self.problem is not None else ""
-            raise NotConnected(f"there is no link to {self.address} now, and nothing was sent{why}")
+            raise NotConnected(f"{NOTHING_SENT}; {self.problem or f'there is no link to {self.address} yet'}")
         return await self._ask(self._connection, method, params, timeout_s)
 
     def dial(self) -> None:
@@ -259,41 +262,43 @@ class Link:
     async def _greeted(self) -> Connection:
         """Return a connection to the address; or, on its own computer, to the gateway's Unix socket.
 
-        A gateway with keys serves accounts of its own computer there, and its port only who has a key.
+        A gateway with keys closes its port to whoever has none, and serves its own computer's accounts there.
+        Where nobody answers at the port, no gateway is there, and another one does not stand in for it.
         """
         try:
             connection, hello = await self._greet(self.address)
-        except WrongRobot:
-            raise
-        except (Unreachable, LinkLost) as error:
-            connection, hello = await self._greet_locally(error)
+        except LinkLost:
+            if (local := await self._greet_locally()) is None:
+                raise
+            connection, hello = local
         if self.hello is not None and self.hello.boot_id != hello.boot_id:
             self.clock.clear()
         self.hello = hello
         return connection
 
-    async def _greet_locally(self, error: ClientError) -> tuple[Connection, Hello]:
-        """Greet the gateway that listens at the address by its Unix socket; raises `error` if there is none.
+    async def _greet_locally(self) -> _Greeted | None:
+        """Return this computer's gateway at the address. All are greeted at once: one may hang."""
+        asked = [asyncio.create_task(self._greet_if_there(one)) for one in local_sockets(self.address)]
+        try:
+            for answer in asyncio.as_completed(asked):
+                if (found := await answer) is not None:
+                    return found
+        finally:
+            for one in asked:
+                one.cancel()
+        return None
 
-        Where nobody listens at the address, the only one with the same port of another address is meant.
-        """
-        refusals, others = "", []
-        for socket in local_sockets(self.address):
-            try:
-                connection, hello = await self._greet(socket)
-            except ClientError as why:
-                refusals += "" if isinstance(why, Unreachable) else f"; {why}"
-                continue
-            is_it = listens_at(self.address, hello.listens)
-            if is_it:
-                return connection, hello
-            connection.close()
-            others += [socket] if is_it is None and isinstance(error, Unreachable) else []
-        if len(others) == 1:
-            return await self._greet(others[0])
-        raise type(error)(f"{error}{refusals}") from error
+    async def _greet_if_there(self, socket: Address) -> _Greeted | None:
+        try:
+            connection, hello = await self._greet(socket)
+        except ClientError:
+            return None
+        if listens_at(self.address, hello.listens):
+            return connection, hello
+        connection.close()
+        return None
 
-    async def _greet(self, address: Address) -> tuple[Connection, Hello]:
+    async def _greet(self, address: Address) -> _Greeted:
         connection = await Connection.open(address, self._notified, self.settings.connect_timeout_s)
         try:
             return connection, await self._exchange_hello(connection)

@@ -63,7 +63,7 @@ def typed(where: str, code: str = "") -> tuple[Address, str]:
 
 
 def place(where: str) -> Address:
-    """Where a robot pairs, as a person typed it; raises `ValueError` where it is no HOST:PORT."""
+    """Return the typed address of a robot that pairs; raises `ValueError` if it is no HOST:PORT."""
     found = Address.parse(where.strip())
     if found.path is not None:
         raise ValueError("a robot pairs at HOST:PORT, as it shows it, not at a path")
@@ -212,7 +212,7 @@ def _pin(robot: str, address: Address, file: Path) -> str:
 
 
 def _entry_of(document: Mapping[str, Any], robot: str, address: Address) -> tuple[str, str | None]:
-    """Its name in the file, and the pin that stands there.
+    """Return its name in the file, and the pin that stands there.
 
     A robot says itself how it is called: that gives it no other one's line.
     """

@@ -29,7 +29,7 @@ class Batch:
     shed: int = 1  # the robot sends one row of so many, because it keeps to its budget
 
     def rows(self) -> Iterator[tuple[int, dict[str, float | None]]]:
-        """Each row as its stamp and its values by channel."""
+        """Yield each row as its stamp and its values by channel."""
         for index, stamp_ns in enumerate(self.stamps_ns):
             yield stamp_ns, {name: column[index] for name, column in self.columns.items()}
 

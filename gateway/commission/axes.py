@@ -29,12 +29,12 @@ class Axis:
         return f"node {self.node}" + (f", axis {self.number}" if self.number else "")
 
     def index(self, index: int) -> int:
-        """Where this axis has the object that the first one has at `index` (CiA 402-2 §5)."""
+        """Return the index, on this axis, of the first axis's object at `index` (CiA 402-2 §5)."""
         return index + self.number * AXIS_OFFSET
 
 
 def axes_of(told: Mapping[int, NodeAnswers]) -> tuple[Axis, ...]:
-    """Every axis of every node that says that it is a drive."""
+    """Return every axis of every node that says that it is a drive."""
     return tuple(Axis(node, axis.number) for node, one in sorted(told.items()) for axis in one.axes)
 
 
@@ -45,7 +45,7 @@ def state(bench: Bench, axis: Axis) -> DriveState | None:
 
 
 def powered(bench: Bench, axes: Sequence[Axis]) -> tuple[Axis, ...]:
-    """Those that might move by themselves, or whose state is not known. Raises `DriverError`."""
+    """Return those that might move by themselves, or whose state is not known. Raises `DriverError`."""
     return tuple(axis for axis in axes if (found := state(bench, axis)) is None or found in ENERGISED)
 
 

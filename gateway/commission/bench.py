@@ -123,7 +123,7 @@ class CanBench:
         return opened(self._bus.name, self._as_master(others), joint, description, wait, others)
 
     def _as_master(self, others: Collection[int]) -> CanSettings:
-        """With a node id of our own that nobody has, and no cycles."""
+        """Return settings with a node id of our own that nobody has, and no cycles."""
         taken = {*self._nodes, *others, self._settings.node_id}
         ours = self._settings.node_id or next(node for node in range(127, 0, -1) if node not in taken)
         return msgspec.structs.replace(self._settings, node_id=ours, sync_period_s=None, heartbeat_s=None)
@@ -138,7 +138,7 @@ class CanBench:
         )  # that this one was closed is no problem of the next
 
     def channel(self, node: int) -> SdoChannel:
-        """To a node, on the open bus. Raises `Unavailable`."""
+        """Return a channel to a node, on the open bus. Raises `Unavailable`."""
         if not self._bus.is_open:
             self._open()
         if node not in self._channels:

@@ -142,7 +142,7 @@ def choose(
 
 
 def agree(text: str) -> Talk[bool]:
-    """Whether somebody says yes; no word is a no."""
+    """Ask; return whether somebody says yes. No answer is a no."""
     typed = yield Ask(text, (YES, NO), NO)
     return typed.lower() in (YES, "yes")
 

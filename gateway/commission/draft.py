@@ -33,7 +33,7 @@ class DraftValue(msgspec.Struct, frozen=True):
 
 @contextmanager
 def alone(file: Path) -> Iterator[None]:
-    """Nobody else commissions `file` meanwhile.
+    """Keep others from commissioning `file` within the block.
 
     Raises:
         SettingsError: somebody does, or nothing can be written beside it.

@@ -99,7 +99,7 @@ def _one(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, metho
 
 
 def _forget_zero(draft: Draft, joint: str) -> DraftValue:
-    """Also on disk: whatever becomes of this program, the zero from before a homing is not gone on with."""
+    """Forget the zero from before a homing, also on disk, whatever becomes of this program."""
     zero = draft.tables[table(joint)]["zero_offset"]
     draft.forget(table(joint), "zero_offset")
     draft.put(told(joint), "homing_begun", True)
@@ -201,7 +201,7 @@ def _new_zero(
 
 
 def _is_there(known: HomingBasis, method: int, outcome: PoweredRunResult, offset: int | None) -> bool:
-    """Whether nothing has moved, and the drive counts as homing makes it count: its 607Ch is where it is."""
+    """Return whether nothing has moved, and the drive counts as homing makes it: its 607Ch is where it is."""
     if METHODS[method].moves or outcome.problem is not None or outcome.after is None:
         return False
     return (

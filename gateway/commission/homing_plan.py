@@ -58,7 +58,7 @@ def told(joint: str) -> str:
 
 
 def refusal(draft: Draft, bench: Bench, joint: str, axis: Axis) -> str | None:
-    """Why it must not be put under power, in words. Raises `DriverError`."""
+    """Return why it must not be put under power, in words. Raises `DriverError`."""
     for key, index in (("rated_current", 0x6075), ("rated_torque", 0x6076)):
         if not draft.value(table(joint), key) and not draft.value(told(joint), key):
             return f"its {key.replace('_', ' ')} is not known ({index:04X}h, or typed)"
@@ -70,7 +70,7 @@ def refusal(draft: Draft, bench: Bench, joint: str, axis: Axis) -> str | None:
 
 
 def armed(bench: Bench, axis: Axis) -> Talk[str | None]:
-    """Why it would not stop by itself if this program died; 6007h may be set for that."""
+    """Return why it would not stop by itself if this program died; may set 6007h so that it does."""
     reaction = yield from answered(lambda: option(bench, axis, ABORT_CONNECTION))
     entries = yield from answered(lambda: number(bench, Axis(axis.node), CONSUMER))
     if not entries:

@@ -35,7 +35,7 @@ def table(joint: str) -> str:
 
 
 def words(joint: str) -> str:
-    """How a person calls it: left knee."""
+    """Return its name for people: left knee."""
     return joint.replace("_", " ")
 
 
@@ -64,7 +64,7 @@ def _names_problem(names: Sequence[str], most: int) -> str | None:
 
 
 def unpowered(bench: Bench, axes: Sequence[Axis]) -> Talk[None]:
-    """Nobody moves a joint by hand whose drive might move it: wait until none has power."""
+    """Wait until no drive has power: nobody moves a joint by hand whose drive might move it."""
     while live := (yield from answered(lambda: powered(bench, axes))):
         yield from press(
             f"{', '.join(map(str, live))} may be under power. Switch the drives off (controller off, or STO) "
@@ -73,7 +73,7 @@ def unpowered(bench: Bench, axes: Sequence[Axis]) -> Talk[None]:
 
 
 def stayed_off(bench: Bench, axes: Sequence[Axis]) -> Talk[bool]:
-    """Whether no drive has got power since `unpowered`: what was read meanwhile may not be by hand alone."""
+    """Return whether no drive has had power since `unpowered`: else readings may not be by hand alone."""
     live = yield from answered(lambda: powered(bench, axes))
     if live:
         yield Say(

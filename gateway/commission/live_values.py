@@ -17,7 +17,7 @@ def watched(
     before: Mapping[Axis, int | None] | None = None,
     angle: Callable[[int], float] | None = None,
 ) -> tuple[DeviceReading, ...]:
-    """Each axis's power and counts, or how far it has counted since `before`. Raises `DriverError`."""
+    """Return each axis's power and counts, or how far it has counted since `before`. Raises `DriverError`."""
     return tuple(one for axis in axes for one in _axis(bench, axis, before, angle))
 
 

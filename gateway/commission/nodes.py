@@ -117,7 +117,7 @@ def _called(node: int, told: NodeAnswers) -> str:
 
 
 def _named(path: Path, draft: Draft) -> str:
-    """As the robot's file names it."""
+    """Return it as the robot's file names it."""
     if path.parent == SHIPPED:
         return path.name
     folder = draft.file.resolve().parent
@@ -158,7 +158,7 @@ def heartbeat(draft: Draft, bench: Bench, node: int) -> Talk[None]:
 
 
 def mapping(draft: Draft, bench: Bench, axis: Axis, told: NodeAnswers, joint: str) -> Talk[None]:
-    """Whether its position comes in a PDO; else whether the gateway may map it."""
+    """Check that its position comes in a PDO; else ask whether the gateway may map it."""
     key = f"joint.{joint}"
     if draft.has(key, "configure_pdos"):
         return
@@ -184,7 +184,7 @@ def mapping(draft: Draft, bench: Bench, axis: Axis, told: NodeAnswers, joint: st
 
 
 def _stored(draft: Draft, bench: Bench, axis: Axis) -> Talk[bool]:
-    """Whether the drive holds the mapping by itself from now on."""
+    """Return whether the drive keeps the mapping by itself from now on."""
     yes = yield from agree(
         "Write it into the drive now instead, and store it there (1010h, with all its present settings)? "
         "Then it holds without the gateway, and after its power was off."

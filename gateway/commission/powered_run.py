@@ -86,7 +86,7 @@ class PoweredRun:
         self._thread.start()
 
     def keep(self) -> None:
-        """Somebody has STOP in reach, now. One gap that was too long ends it: nobody saw what came in it."""
+        """Note that somebody has STOP in reach now. A gap that was too long ends it: nobody saw what came."""
         now = time.monotonic()
         if now - self._kept > KEEP_S:
             self.stop(OUT_OF_REACH)
@@ -144,7 +144,7 @@ class PoweredRun:
         return None
 
     def _ready(self) -> None:
-        """Whether the way up may be begun; raises `RunEnded`."""
+        """Check that powering up may begin; raises `RunEnded`."""
         led = self._wait(self._power.drive.look())
         if led.problem is not None:
             raise RunEnded(led.problem)
@@ -185,7 +185,7 @@ class PoweredRun:
         return None if led is None else led.state
 
     def _asked(self, ask: "Callable[[], Future[T]]", within_s: float = RESET_S + STOP_S) -> T | None:
-        """Its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
+        """Return its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
         try:
             future = ask()
             until = time.monotonic() + within_s

@@ -94,7 +94,7 @@ class Progress:
         self._is_at_end = True
 
     def steps(self) -> tuple[CommissionStep, ...]:
-        """All that are known by now: joints are once they have names."""
+        """Return all that are known by now: joints are once they have names."""
         return tuple(
             CommissionStep(where.part, title, self._state(where, has)) for where, title, has in self._all()
         )
@@ -114,7 +114,7 @@ class Progress:
         return StepState.PASSED if is_past else StepState.NEXT
 
     def _is_behind(self, where: At) -> bool:
-        """Whether a later part was begun already."""
+        """Return whether a later part was begun already."""
         if not self._seen:
             return False
         order = [at for at, _, _ in self._all()]

@@ -36,7 +36,7 @@ class Scale:
 
 
 def problem(first: HeldPose, second: HeldPose) -> str | None:
-    """Why these two say nothing."""
+    """Return why these two say nothing."""
     if abs(second.angle - first.angle) < LEAST_RAD:
         return f"the two angles must differ by {math.degrees(LEAST_RAD):g}° or more"
     if abs(second.counts - first.counts) < LEAST_COUNTS:
@@ -76,7 +76,7 @@ def gear(measured: float, counts_per_revolution: float) -> float:
 
 
 def near(scale: Scale) -> bool:
-    """Whether the drive's zero is within a turn of the joint's, as the robot's file wants it."""
+    """Return whether the drive's zero is within a turn of the joint's, as the robot's file wants it."""
     return abs(scale.zero_offset) <= math.tau
 
 

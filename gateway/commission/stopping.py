@@ -105,7 +105,7 @@ def _stopped(bench: CanBench, known: Collection[Axis]) -> dict[Axis, StopOutcome
 
 
 def axes_of(draft: Draft) -> Iterator[Axis]:
-    """Every drive that was found until now: the first axis of each node, and each joint's."""
+    """Yield every drive that was found until now: the first axis of each node, and each joint's."""
     for table in draft.tables:
         kind, _, name = table.partition(".")
         if kind == "node" and name.isdecimal() and draft.has(table, "identity"):

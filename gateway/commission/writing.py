@@ -51,7 +51,7 @@ def text(draft: Draft, who: str, when: str) -> str:
 
 
 def unfinished(draft: Draft) -> tuple[str, ...]:
-    """Joints whose drive is known and not what it counts: their tables would be of no use."""
+    """Return joints whose drive is known and not what it counts: their tables would be of no use."""
     return tuple(
         joint
         for joint in draft.value("robot", "joints", ())
@@ -130,7 +130,7 @@ def line(key: str, found: DraftValue) -> str:
 
 
 def _plain(text: str) -> str:
-    """For a comment, which ends with its line."""
+    """Return the text for a comment, which ends with its line."""
     return " ".join(text.split())
 
 

@@ -80,7 +80,7 @@ def _scale(settings: JointSettings) -> Scale:
 
 
 def _held_still(bench: Bench, axis: Axis, scale: Scale) -> int:
-    """Its counts, of some looks in a row, without power before and after. Raises `NotRepeated`."""
+    """Return its counts, of some looks in a row, without power before and after. Raises `NotRepeated`."""
     _unpowered(bench, axis)
     seen = [counts(bench, axis) for _ in range(LOOKS)]
     _unpowered(bench, axis)

@@ -71,7 +71,7 @@ def _about_buses(config: RobotConfig) -> Iterator[Finding]:
 
 
 def no_bus(config: RobotConfig, where: str, bus: str) -> Iterator[Finding]:
-    """Where nothing is called so."""
+    """Yield a finding if there is no bus of this name."""
     buses = config.names("can")
     if bus not in buses:
         known = ", ".join(buses) or "none"

@@ -40,7 +40,7 @@ def warnings(config: RobotConfig) -> Iterator[Finding]:
 
 
 def implausible(where: str, key: str, value: float, unit: str) -> Iterator[Finding]:
-    """Where a quantity is likely in another unit."""
+    """Yield quantities that are likely in another unit."""
     largest, other, factor, offset = _LARGEST.get(unit, (math.inf, "", 1.0, 0.0))
     if largest < abs(value) < math.inf:
         slip = f"{value:g}{other} is {round(value * factor + offset, 4):g} {unit}"

@@ -137,7 +137,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return [name for table in tables for name in (*getattr(self, table), *self.lost.get(table, ()))]
 
     def node_of(self, component: str) -> Node:
-        """Where a joint or device is: bus and node id."""
+        """Return the bus and node id of a joint or device."""
         table = self.joint[component] if component in self.joint else self.device[component]
         return table.bus, table.node_id
 
@@ -159,14 +159,14 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return {quantity: one for (owner, _, quantity), one in whole if owner == component}
 
     def on_buses(self) -> Iterator[tuple[str, OnBus]]:
-        """Every table of something on a CAN bus, with its header."""
+        """Yield every table of something on a CAN bus, with its header."""
         for table in COMPONENT_TABLES:
             for name, settings in getattr(self, table).items():
                 if isinstance(settings, OnBus):
                     yield f"[{table}.{name}]", settings
 
     def on_ports(self) -> Iterator[tuple[str, OnPort]]:
-        """Every table of a sensor on a serial port, with its header."""
+        """Yield every table of a sensor on a serial port, with its header."""
         for table in (ComponentKind.INSOLE, ComponentKind.IMU):
             for name, settings in getattr(self, table).items():
                 if isinstance(settings, OnPort):
@@ -185,5 +185,5 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
 
 
 def header(table: str, name: str) -> str:
-    """As the file writes it."""
+    """Return it as the file writes it."""
     return f'[{table}."{name}"]' if "." in name else f"[{table}.{name}]"

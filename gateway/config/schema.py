@@ -18,7 +18,7 @@ _IMUS: tuple[type[Struct], ...] = (ImuSettings, CanImuSettings, InclinometerSett
 
 
 def schema() -> Schema:
-    """All of it."""
+    """Return all of it."""
     plain = {name: struct for name, struct in NAMED.items() if name != "imu"}
     defs = definitions([*SINGLE.values(), *plain.values(), *_IMUS, GuardSettings, *_rules()])
     for struct, formats in _formats():

@@ -63,7 +63,7 @@ class Accounts:
             self._finished()
 
     def _asked(self, peer: Peer) -> Peer | None:
-        """With names; nothing where nobody answers in time, or so many have not answered yet."""
+        """Ask for the names; nothing if nobody answers in time, or so many have not answered yet."""
         found: list[Peer] = []
         # Of no owner: whoever hangs in the system's directory can be joined by nobody.
         asking = threading.Thread(target=partial(_ask, peer, found), name="directory", daemon=True)

@@ -110,7 +110,7 @@ class FairShare(TimeSharing):
     # Memory
 
     def hold(self, holder: Holder, size: int) -> None:
-        """So many more bytes wait for this client; fewer, where it is negative."""
+        """Note that so many more bytes wait for this client; fewer, if it is negative."""
         self._bytes += size
         if holder.waiting_bytes:
             self._holders[holder] = None

@@ -151,7 +151,7 @@ class Handshakes:
         self._settle()
 
     def _look(self) -> None:
-        """Whether clients or roles have changed; if so, they count from now on."""
+        """Look for changed clients or roles; they count from now on."""
         known = self._access.now()
         if known is self._known:
             return
@@ -248,7 +248,7 @@ class _Handshake:
             self._owner.is_over(self)
 
     def _begun(self) -> TlsStream | None:
-        """By the first byte: to what is no TLS not even an alert is said."""
+        """Begin by the first byte: what is no TLS is not even told an alert."""
         first = self._socket.recv(1, socket.MSG_PEEK)
         if first and first[0] == _HANDSHAKE:
             self._stream = TlsStream(self._socket, self._context)

@@ -106,7 +106,7 @@ class IncomingBytes:
     # In the loop's thread.
 
     def done(self, count: int, size: int = 0) -> None:
-        """So much of what was handed over does not wait any more."""
+        """Note that so much of what was handed over does not wait any more."""
         self._done += count
         self._done_bytes += size
 
@@ -134,7 +134,7 @@ class IncomingBytes:
         self.receiver = bool
 
     def _read_last(self) -> None:
-        """For the newest stop in it, as far as that takes this thread no long time."""
+        """Read for the newest stop in it, as far as that takes this thread no long time."""
         found, until_ns = None, time.thread_time_ns() + LAST_NS
         for found in self._splitter.newest_first(self._unread()):
             if found is not None or time.thread_time_ns() >= until_ns:
@@ -189,7 +189,7 @@ class IncomingBytes:
         return read
 
     def _look_again(self) -> None:
-        """At what no poll tells of; who rests or waits for a turn is looked at after that."""
+        """Look at what no poll tells of; who rests or waits for a turn is looked at after that."""
         if not (self._ended or self._closed or self._waits or self._rests):
             self._on_ready(READ)
 

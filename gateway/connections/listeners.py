@@ -93,9 +93,8 @@ def listen_locally(path: Path) -> socket.socket:
 
 
 def default_socket(folder: Path, robot: str) -> Path:
-    """Where one robot's is, in the folder that the system gives for such: of a service, or of a user."""
-    own = folder if folder.name == "gwrms" else folder / "gwrms"
-    return own / f"{re.sub('[^A-Za-z0-9_.-]', '-', robot)}.sock"
+    """Return where one robot's is in a folder for such."""
+    return folder / f"{re.sub('[^A-Za-z0-9_.-]', '-', robot)}.sock"
 
 
 def _answers(path: Path) -> bool:

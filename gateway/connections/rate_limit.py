@@ -59,7 +59,7 @@ class Account:
         return self.owed_ns
 
     def floods(self, stops: int) -> bool:
-        """Whether these are too many, with those just before. All of them act; they are read later."""
+        """Return whether these and the last ones are too many. All of them act; they are read later."""
         now_s = time.monotonic()
         forgotten = (now_s - self._stops_at_s) * FLOOD / (2 * FLOOD_S)
         self._stops, self._stops_at_s = max(0.0, self._stops - forgotten) + stops, now_s

@@ -239,7 +239,7 @@ class Session:
     def _hear_greetings(
         self, lines: list[tuple[int, bytes | framing.BadLine]], refusal: framing.RpcError
     ) -> None:
-        """Up to the first line that is none: that one is answered, and ends what is heard."""
+        """Hear greetings up to the first other line: that one is answered, and ends what is heard."""
         others = (at for at, (_asked_ns, line) in enumerate(lines) if not _is_greeting(line))
         heard = 0 if self._input_ended else next(others, len(lines))
         self._queue.extend(lines[:heard])

@@ -75,7 +75,7 @@ def _id(found: dict[str, Any]) -> Id | float | UnsetType:
 
 
 def _reason(params: Any) -> str:
-    """By name as it should be, or the first of a list, or what there is."""
+    """Return the reason: by name as it should be, or the first of a list, or what there is."""
     if isinstance(params, list):
         params = params[0] if params else None
     if isinstance(params, dict):
@@ -111,17 +111,17 @@ class StopSearch:
         self._tail = b""
 
     def is_in(self, line: bytes) -> bool:
-        """For a line that is there as a whole."""
+        """Return whether a stop is in a whole line."""
         return self.feed(line) or self.end()
 
     def feed(self, piece: bytes) -> bool:
-        """Whether it is there, with this piece."""
+        """Return whether it is there, with this piece."""
         bare = self._tail + piece.translate(None, _BLANK)
         self._tail = bare[-_KEPT_BYTES:]
         return _METHOD.search(_ESCAPED.sub(_unescape, bare).replace(b"\\", b"")) is not None
 
     def end(self) -> bool:
-        """Whether it is there, now that the line has ended."""
+        """Return whether it is there, now that the line has ended."""
         return self.feed(b"}")
 
 
@@ -145,7 +145,7 @@ class StopSplitter(LineSplitter):
         return super().feed(data)
 
     def _may_stop(self, data: bytes) -> bool:
-        """Whether there may be a stop in what these bytes end or hold; costs little."""
+        """Return whether there may be a stop in what these bytes end or hold; costs little."""
         seam = bytes(self._rest[-_LONGEST_MARK:]) + data
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
 

@@ -86,7 +86,7 @@ class TlsStream:
             self._lock.release()
 
     def pending(self) -> int:
-        """Bytes that have come already, and of which no poll tells."""
+        """Return bytes that have come already, and of which no poll tells."""
         self._lock_to_read()
         try:
             return self._waiting

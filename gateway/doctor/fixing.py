@@ -43,11 +43,11 @@ class Mender:
         }
 
     def can(self, fix: Fix) -> bool:
-        """Whether that is a fix of ours; all else is for people."""
+        """Return whether the doctor can apply this fix; all else is for people."""
         return fix.is_safe if isinstance(fix, Write) else type(fix) in self._acts
 
     def objection(self, finding: Finding, fix: Fix, others: Iterable[Finding]) -> str | None:
-        """Why not to do it now; nobody is asked about it then."""
+        """Return why not to do it now; then nobody is asked about it."""
         about = _touched(fix)
         if about & self._edited:
             return "it was judged by a line that has changed since: start the gateway again, then ask again"
@@ -175,7 +175,7 @@ class Mender:
 
 
 def _touched(fix: Fix) -> set[str]:
-    """Names of joints, devices and sensors whose table or object it changes."""
+    """Return names of joints, devices and sensors whose table or object it changes."""
     if isinstance(fix, Write):
         return {fix.component}
     edits = fix.edits if isinstance(fix, Together) else (fix,) if isinstance(fix, Edit) else ()
@@ -194,6 +194,6 @@ def _value(fix: Write, parameter: ParameterInfo) -> float:
 
 
 def _permission(fix: Write) -> str:
-    """How the robot's owner lets it be written."""
+    """Return how the robot's owner permits the write."""
     lines = " and below it ".join(fix.release)
     return f"the robot's file has the last word on what may be written; this allows it: {lines}"

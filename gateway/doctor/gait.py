@@ -82,7 +82,7 @@ def gait(seen: Observations) -> Gait | str:
 
 
 def is_flipped(match: Match) -> bool:
-    """Whether a joint bends where it should stretch."""
+    """Return whether a joint bends where it should stretch."""
     return -match.own > LIKE
 
 
@@ -97,7 +97,7 @@ def _is_of_other_leg(match: Match | None) -> bool:
 
 
 def _landings(values: Sequence[float], period_s: float) -> list[int]:
-    """Where a foot begins to stand, whatever its scale."""
+    """Return the samples at which a foot begins to stand, whatever its scale."""
     most = percentile(values, 0.98)
     if most <= 0.0 or most < LEAST_LOAD * fmean(values):
         return []

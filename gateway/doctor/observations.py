@@ -108,7 +108,7 @@ class Observations:
     other_file: str | None = None  # why the gateway judges by another file than this
 
     def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:
-        """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""
+        """Return what came on a bus, by identifier; `None` if it was not listened to, or nobody was heard."""
         facts = self.buses.get(bus)
         return None if facts is None or facts.is_silent else facts.heard
 
@@ -116,7 +116,7 @@ class Observations:
         return (Place("joint", name, table) for name, table in self.config.joint.items())
 
     def nodes(self) -> Iterator[Place]:
-        """Joints and devices, one for each node."""
+        """Yield joints and devices, one for each node."""
         seen: set[tuple[str, int]] = set()
         devices = (Place("device", name, table) for name, table in self.config.device.items())
         for place in (*self.joints(), *devices):
@@ -131,7 +131,7 @@ class Observations:
         return self.objects.get(place.name, {}).get((index + shift, subindex))
 
     def unanswered(self, place: Place, index: int, subindex: int = 0) -> bool:
-        """Whether its file has the object, and it is not known what the device holds there."""
+        """Return whether its file has the object, but the device's value is unknown."""
         shift = AXIS_OFFSET * place.axis if index >= FIRST_PROFILE_OBJECT else 0
         description = self.descriptions.get(place.name)
         asked = (index + shift, subindex) in self.objects.get(place.name, {})
@@ -143,7 +143,7 @@ class Observations:
         return None if value is None else int(value)
 
     def why_no(self, channel: str) -> str:
-        """Why a channel could not be judged by."""
+        """Return why a channel cannot be used."""
         component = channel.partition(".")[0]
         late = "its values came too late, or not at all"
         known = channel in self.samples.columns

@@ -14,7 +14,7 @@ _shtab_gwrms_commands() {
     bench:'Measure a robot'"'"'s gateway: latency, CPU and memory.'
     blame:'Watch the robot'"'"'s control loop, and name the processes that delay it.'
     calibrate:'calibrate an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
-    check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
+    check:'Check a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
     cloud:'browse, upload, download, verify and tidy the store'
     collect:'Record all robots into the store; show the status of the running collector.'
     commission:'Determine the contents of a robot'"'"'s file, one joint at a time, and write it.'
@@ -22,7 +22,7 @@ _shtab_gwrms_commands() {
     cost:'Show the cost of monitoring a robot: CPU, memory, wake-ups, bus, network.'
     demo:'Start a simulated exoskeleton, its gateway and a live view.'
     describe:'Show a robot'"'"'s components and buses with their problems, since when and what'
-    docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
+    docs:'Print a page of the installed documentation; without a name, list all pages. The last part of a page'"'"'s name is'
     doctor:'Find mistakes of a robot: in its file, on its buses, of its sensors and its computer, through its gateway if'
     edits:'Show the effect of each parameter edit on the walk.'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
@@ -31,7 +31,7 @@ _shtab_gwrms_commands() {
     gateway:'Serves one robot over TCP: joints over CANopen, insoles and IMU over serial ports, and'
     get:'Read parameters from the devices.'
     gui:'Open the window: monitor robots live, change parameters safely, STOP always in sight.'
-    install-service:'Writes systemd units for the gateway of CONFIG.'
+    install-service:'Write systemd units for the gateway of CONFIG.'
     joint-test:'test a joint on a bench: step, chirp, friction, relay'
     journal:'show and verify the robot'"'"'s journal'
     keys:'on the robot: admit and revoke clients'
@@ -39,7 +39,7 @@ _shtab_gwrms_commands() {
     lss:'Find CANopen devices without a node id; set node ids and bit rates (CiA 305).'
     models:'inspect, promote, roll back and export models'
     od:'Search a device'"'"'s object dictionary: names, types, limits, values.'
-    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it'
+    pair:'Pair this desk with the robot on which `gwrms keys pair` shows a code. The command asks for the code, so'
     params:'save, compare and apply parameter files'
     plot:'Plot channels live, until q or Ctrl-C.'
     predict:'Predict the activity of robot and wearer, with the trust in the models.'
@@ -50,9 +50,9 @@ _shtab_gwrms_commands() {
     sensor:'Identify the sensor on a serial port, and show its values live.'
     sessions:'list, inspect and export recordings: CSV, Parquet, MCAP'
     set:'Change parameters: all or none, limit-checked, read back.'
-    sim:'A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen'
-    sim-fault:'Makes a fault in the robot of a running `gwrms sim --dir DIR`, or ends it. Without --for it stays until it is'
-    sim-record:'Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and'
+    sim:'Simulate a whole lower-limb exoskeleton: six CiA 402 joint drives and a gait controller on a CANopen bus, two'
+    sim-fault:'Make a fault in the robot of a running `gwrms sim --dir DIR`, or end it. Without --for it stays until it is'
+    sim-record:'Write what a gateway would report of the simulated robot (with its channel names, SI units, and the noise and'
     snapshot:'Take a snapshot of a robot.'
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Store a device'"'"'s present parameters in its memory (1010h).'
@@ -67,25 +67,25 @@ _shtab_gwrms_commands() {
 
 _shtab_gwrms_calibrate_commands() {
   local _commands=(
-    imu:'Takes the present posture as upright and writes it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
-    insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
-    joint:'Find a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
+    imu:'Take the present posture as upright, and write it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
+    insole:'Measure the unloaded cells, then known loads on the whole insole; fit, show the fit, and ask before writing. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
+    joint:'Find a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new zero are shown; once you confirm, the new one is written into the robot'"'"'s file, with a comment and a journal entry. Nothing is moved. End this robot'"'"'s gateway first.'
   )
   _describe 'gwrms calibrate commands' _commands
 }
 
 _shtab_gwrms_cloud_commands() {
   local _commands=(
-    compact:'Put small files together.'
+    compact:'Merge small files.'
     download:'Download a store, or a part of it, to a folder, which is a store too.'
     du:'Show the space used in the store, by tables and robots.'
     forget:'Remove a wearer'"'"'s sessions: rows, labels, predictions, of every version; and prove that they are gone.'
     ls:'List the store'"'"'s tables, or with --path the files below one.'
     mend:'Take missing or damaged files out of the store, and restore their rows from the spool.'
-    retain:'Remove rows that are older than so many days.'
+    retain:'Remove rows older than a number of days.'
     upload:'Upload pending data of the spool, or copy a whole store.'
     vacuum:'Delete files that no newer version needs.'
-    verify:'Check every file of every table, and that each row which this computer'"'"'s spool has sent is there once,'
+    verify:'Check every file of every table, and that each row sent by this computer'"'"'s spool is there once,'
     witnesses:'Print this desk'"'"'s witnesses of a robot'"'"'s journal, signed by the robot.'
   )
   _describe 'gwrms cloud commands' _commands
@@ -112,7 +112,7 @@ _shtab_gwrms_joint_test_commands() {
 
 _shtab_gwrms_journal_commands() {
   local _commands=(
-    tail:'The newest entries: who did what, when, and what came of it. WHO is known by their key or account'
+    tail:'Show the newest entries: who did what, when, and the outcome. WHO is identified by key or account'
     verify:'Check every entry of a journal, and compare it with the witnesses of desks.'
   )
   _describe 'gwrms journal commands' _commands
@@ -120,10 +120,10 @@ _shtab_gwrms_journal_commands() {
 
 _shtab_gwrms_keys_commands() {
   local _commands=(
-    add:'Let a key in whose certificate (PEM) comes on the standard input. gwrms keys push runs this by ssh.'
+    add:'Admit the key whose certificate (PEM) comes on standard input. gwrms keys push runs this by ssh.'
     list:'List the clients of this robot, with their roles.'
-    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you'
-    push:'Lets a key in on further robots: runs `gwrms keys add` on each by ssh, as whoever may log in there and use'
+    pair:'Show HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for the code and proves that it knows it;'
+    push:'Admit a key on further robots: runs `gwrms keys add` on each by ssh, with an account that may log in there and'
     revoke:'Revoke a client. A running gateway closes its connections at once.'
   )
   _describe 'gwrms keys commands' _commands
@@ -152,9 +152,9 @@ _shtab_gwrms_params_commands() {
 
 _shtab_gwrms_sensor_commands() {
   local _commands=(
-    decode:'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. Exit status 1 where most bytes belong to no frame of this format.'
-    record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a wrong baud rate.'
-    replay:'Sends a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
+    decode:'Print a JSON line per frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. Exit status 1 if most bytes belong to no frame of this format.'
+    record:'Record a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. The command listens first, as gwrms sensor does, and records nothing if no format fits: that may be noise, at a wrong baud rate.'
+    replay:'Send a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
   )
   _describe 'gwrms sensor commands' _commands
 }
@@ -174,7 +174,7 @@ _shtab_gwrms_sessions_commands() {
 
 _shtab_gwrms_sim_commands() {
   local _commands=(
-    run:'Runs scenario files: each with a simulated robot and a gateway of its own, as a process. What the files say'
+    run:'Run scenario files: each with a simulated robot and a gateway of its own, as a process. The files'"'"' events'
   )
   _describe 'gwrms sim commands' _commands
 }
@@ -295,7 +295,7 @@ _shtab_gwrms_cloud_defaults_added=0
 _shtab_gwrms_cloud_compact_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--dry-run[only show what would be done]"
   "--alone[confirm that no server runs, for a store without conditional writes]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
@@ -307,7 +307,7 @@ _shtab_gwrms_cloud_compact_defaults_added=0
 _shtab_gwrms_cloud_download_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--out[where to]:FOLDER:_files"
   "*--robot[only these\; repeatable]:GLOB:"
   "*--session[only these\; repeatable]:NAME:"
@@ -320,7 +320,7 @@ _shtab_gwrms_cloud_download_defaults_added=0
 _shtab_gwrms_cloud_du_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -330,7 +330,7 @@ _shtab_gwrms_cloud_du_defaults_added=0
 _shtab_gwrms_cloud_forget_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--wearer[the wearer to forget]:ID:"
   "--dry-run[only show what would be removed]"
@@ -345,7 +345,7 @@ _shtab_gwrms_cloud_forget_defaults_added=0
 _shtab_gwrms_cloud_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--path[as in telemetry\/000\/robot\=exo-01]:PATH:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
@@ -356,7 +356,7 @@ _shtab_gwrms_cloud_ls_defaults_added=0
 _shtab_gwrms_cloud_mend_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--dry-run[only show what would be done]"
   "--alone[confirm that no other server runs, for a store without conditional writes]"
   "--accept-loss[accept the present rows as complete]"
@@ -370,7 +370,7 @@ _shtab_gwrms_cloud_mend_defaults_added=0
 _shtab_gwrms_cloud_retain_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--dry-run[only show what would be done]"
   "--alone[confirm that no server runs, for a store without conditional writes]"
   "--days[the greatest age of rows]:N:"
@@ -385,7 +385,7 @@ _shtab_gwrms_cloud_retain_defaults_added=0
 _shtab_gwrms_cloud_upload_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--from[the store to copy]:URL:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
@@ -396,7 +396,7 @@ _shtab_gwrms_cloud_upload_defaults_added=0
 _shtab_gwrms_cloud_vacuum_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--dry-run[only show what would be done]"
   "--alone[confirm that no server runs, for a store without conditional writes]"
   "--grace[(default\: 7)]:DAYS:"
@@ -409,7 +409,7 @@ _shtab_gwrms_cloud_vacuum_defaults_added=0
 _shtab_gwrms_cloud_verify_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--quick[count the rows only, without comparing values]"
   "--deep[read every value, even without a receipt here]"
   "--quiet[print nothing if the store is whole, as for cron]"
@@ -422,7 +422,7 @@ _shtab_gwrms_cloud_verify_defaults_added=0
 _shtab_gwrms_cloud_witnesses_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name in the store:"
 )
@@ -532,7 +532,7 @@ _shtab_gwrms_doctor_defaults_added=0
 _shtab_gwrms_edits_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "*--robot[only this robot\'s edits (repeatable)]:NAME:"
 )
 
@@ -542,7 +542,7 @@ _shtab_gwrms_edits_defaults_added=0
 _shtab_gwrms_edits_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   ":id from gwrms edits\; may be abbreviated:"
 )
 
@@ -820,7 +820,7 @@ _shtab_gwrms_keys_revoke_defaults_added=0
 _shtab_gwrms_label_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--robot[needed if sessions of two robots have one name]:NAME:"
   "--from[beginning]:TIME:"
   "--to[end]:TIME:"
@@ -869,7 +869,7 @@ _shtab_gwrms_models_defaults_added=0
 _shtab_gwrms_models_export_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--onnx[output file\; replaced if it exists]:FILE:_files"
   ":its name, which may be abbreviated:"
@@ -881,7 +881,7 @@ _shtab_gwrms_models_export_defaults_added=0
 _shtab_gwrms_models_history_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--robot[this robot\'s own models (default\: those for all)]:NAME:"
   ":task:(activity gait_phase falling)"
@@ -893,7 +893,7 @@ _shtab_gwrms_models_history_defaults_added=0
 _shtab_gwrms_models_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--task[these alone]:task:(activity gait_phase falling)"
 )
@@ -904,7 +904,7 @@ _shtab_gwrms_models_ls_defaults_added=0
 _shtab_gwrms_models_promote_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--instead-of[promote only while this one serves\; nothing\: while none does]:MODEL:"
   "--robot[this robot alone (default\: that for every robot)]:NAME:"
@@ -919,7 +919,7 @@ _shtab_gwrms_models_promote_defaults_added=0
 _shtab_gwrms_models_rollback_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--robot[this robot\'s own model (default\: that for every robot)]:NAME:"
   "--who[author (default\: your account)]:WHO:"
@@ -933,7 +933,7 @@ _shtab_gwrms_models_rollback_defaults_added=0
 _shtab_gwrms_models_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name, which may be abbreviated:"
 )
@@ -965,7 +965,7 @@ _shtab_gwrms_pair_options=(
   "--name[this desk\'s name on the robot (default\: your user and computer)]:name:"
   "--json[print one JSON object, for programs]"
   ":as the robot shows it (default\: ask):"
-  ":the code, instead of a question\; others here may see it:"
+  ":the code, instead of asking for it\; others on this computer may see it:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1031,7 +1031,7 @@ _shtab_gwrms_plot_defaults_added=0
 _shtab_gwrms_predict_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "*--robot[live\: a robot of the server\'s file, or its address\; repeatable]:NAME|[NAME=]HOST:PORT:"
   "--seconds[live\: duration]:N:"
   "*--session[over a recording\: its name, which may be abbreviated\; repeatable]:SESSION:"
@@ -1049,7 +1049,7 @@ _shtab_gwrms_predict_defaults_added=0
 _shtab_gwrms_query_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--csv[CSV, every row]"
   "--robot[only this robot\'s rows\: opens its shard only]:NAME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
@@ -1148,7 +1148,7 @@ _shtab_gwrms_sessions_defaults_added=0
 _shtab_gwrms_sessions_changed_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--facts[show only what changed\; reads no telemetry]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":the session in which it worked\; its name, which may be abbreviated:"
@@ -1161,7 +1161,7 @@ _shtab_gwrms_sessions_changed_defaults_added=0
 _shtab_gwrms_sessions_compare_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":sessions by their names, which may be abbreviated:"
   ":the same, of another version:"
@@ -1173,7 +1173,7 @@ _shtab_gwrms_sessions_compare_defaults_added=0
 _shtab_gwrms_sessions_export_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--out[output file\; replaced if it exists]:FILE:_files"
   "--format[default\: by the ending of FILE]:format:(csv parquet mcap)"
@@ -1189,7 +1189,7 @@ _shtab_gwrms_sessions_export_defaults_added=0
 _shtab_gwrms_sessions_gait_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--from[a time (UTC), or seconds since the session\'s first sample]:TIME:"
   "--to[a time (UTC), or seconds since the session\'s first sample]:TIME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
@@ -1202,7 +1202,7 @@ _shtab_gwrms_sessions_gait_defaults_added=0
 _shtab_gwrms_sessions_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--robot[only these robots]:GLOB:"
   "--from[nothing before it\; as ISO 8601 writes it, UTC]:TIME:"
   "--to[nothing from it on\; likewise]:TIME:"
@@ -1215,7 +1215,7 @@ _shtab_gwrms_sessions_ls_defaults_added=0
 _shtab_gwrms_sessions_resources_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--all[include programs that used nothing]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name, which may be abbreviated:"
@@ -1227,7 +1227,7 @@ _shtab_gwrms_sessions_resources_defaults_added=0
 _shtab_gwrms_sessions_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name, which may be abbreviated:"
 )
@@ -1408,7 +1408,7 @@ _shtab_gwrms_trace_defaults_added=0
 _shtab_gwrms_train_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for programs]"
+  "--json[print JSON, for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--robot[learn from this robot only, and serve only it]:NAME:"
   "*--session[only these\; repeatable]:NAME:"

@@ -74,7 +74,7 @@ class ArmedDrives:
         return failures
 
     def objection(self) -> str | None:
-        """Why the gateway must not end now, in words; `None` where it may."""
+        """Return why the gateway must not end now, in words; `None` if it may."""
         found = [text for name, drive in self._drives.items() if (text := _still_on(name, drive)) is not None]
         if not found:
             return None

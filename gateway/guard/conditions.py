@@ -14,7 +14,7 @@ class Band:
     hysteresis: float
 
     def left(self, value: float, *, tripped: bool) -> bool:
-        """Whether `value` is outside of the band, or not far enough back inside."""
+        """Return whether `value` is outside of the band, or not far enough back inside."""
         margin = self.hysteresis if tripped else 0.0
         return not self.low + margin <= value <= self.high - margin
 

@@ -77,14 +77,14 @@ class GuardModule:
             self._control.journal.append(WHO, "not disarmed", reason=failure)
 
     def objection(self) -> str | None:
-        """Why the gateway must not end now, in words; that it was asked to is put down."""
+        """Return why the gateway must not end now, in words; a refused end goes into the journal."""
         why = self._armings.objection()
         if why is not None:
             self._control.journal.append(WHO, "end refused", reason=why)
         return why
 
     def info(self) -> GuardInfo:
-        """As `robot.describe` shows it."""
+        """Return it as `robot.describe` shows it."""
         return GuardInfo(
             configured=True,
             heartbeat_ms=self._settings.heartbeat_ms,

@@ -51,7 +51,7 @@ class Beside:
 
 @singledispatch
 def judging(rule: GuardRule, beside: Beside) -> Judging:  # noqa: ARG001 - those below have it
-    """How this rule judges; raises `TypeError` where it judges no number."""
+    """Return this rule's judgement; raises `TypeError` if it judges no number."""
     raise TypeError(f"{rule.watch} judges no number")
 
 

@@ -62,7 +62,7 @@ class Wiring:
         ]
 
     def _known(self) -> Mapping[str, str]:
-        """Every component, or every bus, and its kind."""
+        """Return every component, or every bus, and its kind."""
         if BUS in WATCHES[self.rule.watch].kinds:
             return dict.fromkeys(self._robot.buses, BUS)
         absent = {name: kind for name, (kind, _why) in self._robot.absent.items()}

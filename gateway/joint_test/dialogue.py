@@ -312,7 +312,7 @@ def _reader(test: Test, power: Power, known: DriveFacts) -> Iterator[JointDrive]
 
 
 def _operational(power: Power) -> bool:
-    """Whether its heartbeat says so; one from before our NMT start may still be under way."""
+    """Return whether its heartbeat says so; one from before our NMT start may still be under way."""
     life = power.node.life
     return life.nmt_state is NmtState.OPERATIONAL or life.timeout_s is None
 

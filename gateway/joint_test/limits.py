@@ -114,7 +114,7 @@ def limits(
 
 
 def check_room(wish: Wish, angle: float, targets: tuple[float, float], ends: tuple[float, float]) -> None:
-    """Whether the lowest and highest of the `targets`, relative to `angle`, are well within its `ends` (rad).
+    """Check that the extremes of `targets`, relative to `angle`, are well within its `ends` (rad).
 
     Raises:
         NotAllowed: it would come too near to one, or beyond.

@@ -79,7 +79,7 @@ def _rest(seconds: float, at: float, period_s: float) -> Iterator[float]:
 
 
 def _step(wish: Wish, period_s: float) -> Iterator[float]:
-    """There and back, each as fast as the speed allows."""
+    """Yield the way there and back, each as fast as the speed allows."""
     yield from _rest(STEP_REST_S, 0.0, period_s)
     for _ in range(wish.repeat):
         yield from _line(0.0, wish.amplitude, wish.speed, period_s)
@@ -108,7 +108,7 @@ def _chirp(wish: Wish, period_s: float) -> Iterator[float]:
 
 
 def _friction(wish: Wish, period_s: float) -> Iterator[float]:
-    """At constant speeds there and back, the fastest first."""
+    """Yield the way at constant speeds there and back, the fastest first."""
     for level in range(LEVELS):
         speed = wish.speed / 2**level
         for start, end in ((0.0, wish.amplitude), (wish.amplitude, 0.0)):

@@ -53,7 +53,7 @@ def put_back(sdo: SdoChannel, description: Description, before: Parameters, name
 
 
 def _readable(description: Description, offset: int) -> Iterator[tuple[int, int, DataType | None]]:
-    """Index, sub-index and type; no type: a text."""
+    """Yield index, sub-index and type; no type: a text."""
     yield from ((index, 0, None) for index in _TEXTS if description.has(index))
     for one in description.variables():
         kind = _integer(one.data_type)

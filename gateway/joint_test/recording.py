@@ -42,7 +42,7 @@ class JointTestRecording:
         self._file.flush()
 
     def end(self, **how: Any) -> None:
-        """How it ended, and all of it on disk."""
+        """Write how it ended, and put all of it on disk."""
         self._line({"ended": how})
         os.fsync(self._file.fileno())
 

@@ -83,7 +83,7 @@ class JointMonitor:
         self._end()
 
     def after(self, sync_ns: int, within_s: float) -> DriveSample | None:
-        """All that comes with each SYNC; `None` where it stays away."""
+        """Return all that comes with each SYNC; `None` where it stays away."""
         wanted = [self.index[name] for name in self.brings]
         deadline = time.monotonic() + within_s
         while any((self._latest.stamp_ns(index) or 0) < sync_ns for index in wanted):
@@ -188,7 +188,7 @@ class TestRun(PoweredRun):
         return first.position
 
     def _cycle(self, due: float) -> DriveSample:
-        """At its time, one SYNC and what the drive answers."""
+        """Send one SYNC at its time, and return what the drive answers."""
         while (left := due - time.monotonic()) > 0:
             self._rest(left)
         self._check()
@@ -244,7 +244,7 @@ class TestRun(PoweredRun):
     # Whether all is as it must be.
 
     def _check_place(self, angle: float) -> None:
-        """Whether it still stands where it was when somebody agreed to what will move."""
+        """Check that it still stands where it was when somebody agreed to the motion."""
         plan = self._plan
         if abs(angle - plan.angle) > DRIFT:
             raise RunEnded(
@@ -316,7 +316,7 @@ class TestRun(PoweredRun):
     # Afterwards, without power.
 
     def _restore(self) -> str | None:
-        """All parameters as they were before, read back."""
+        """Return all parameters as they were before, read back."""
         before, description = self._plan.parameters, self._power.node.description
         offset = self._power.drive.settings.axis * AXIS_OFFSET
 

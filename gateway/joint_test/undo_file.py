@@ -71,7 +71,7 @@ def changes(before: Parameters, mode: int, offset: int) -> tuple[OriginalValue, 
 
 
 def keep(path: Path, left: Unfinished) -> None:
-    """Before the first of them is written; raises `OSError`."""
+    """Keep it before the first of them is written; raises `OSError`."""
     durable.write(path, msgspec.json.encode(left))
 
 

@@ -81,7 +81,7 @@ def _row(name: str, value: Number, info: ParameterInfo | None, held: ParameterVa
 def _objections(
     info: ParameterInfo, coding: Coding, stored: Number, held: Number
 ) -> Iterator[tuple[ComparisonVerdict, str]]:
-    """Why the robot would refuse to change it, the most lasting reason first."""
+    """Yield why the robot would refuse to change it, the most lasting reason first."""
     if info.read_only is not None:
         yield ComparisonVerdict.READ_ONLY, info.read_only
     broken = broken_limit(info, coding, stored, held)

@@ -52,12 +52,12 @@ class Format:
 
 
 def is_configuration(info: ParameterInfo) -> bool:
-    """Whether it can be read and is no command, which the master writes while the robot moves."""
+    """Return whether it can be read and is no command, which the master writes while the robot moves."""
     return info.problem is None and info.read_only not in COMMANDS
 
 
 def is_meant(info: ParameterInfo, globs: Sequence[str]) -> bool:
-    """Whether one of the names, addresses or globs means the parameter."""
+    """Return whether one of the names, addresses or globs means the parameter."""
     return matches(info.name, globs) or f"{info.component}.{info.object}" in globs
 
 

@@ -57,7 +57,7 @@ _LIMITED = "memory is not locked: allow it with LimitMEMLOCK=infinity, or CAP_IP
 
 
 def _is_allowed() -> bool:
-    """Under a limit, a lock on all that is to come would make later allocations fail instead."""
+    """Return whether a lock is allowed: under a limit it would make later allocations fail instead."""
     soft, _hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     return soft == resource.RLIM_INFINITY or os.geteuid() == 0
 

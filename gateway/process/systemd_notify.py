@@ -16,7 +16,7 @@ def tell(state: str, environ: Mapping[str, str] = os.environ) -> None:
 
 
 def watchdog_s(environ: Mapping[str, str] = os.environ) -> float | None:
-    """How soon it wants to hear of us again and again (sd_watchdog_enabled(3)), `None` where it does not."""
+    """Return systemd's watchdog period (sd_watchdog_enabled(3)), `None` if there is no watchdog."""
     period_us, process = environ.get("WATCHDOG_USEC", ""), environ.get("WATCHDOG_PID", str(os.getpid()))
     if not period_us.isdecimal() or not int(period_us) or process != str(os.getpid()):
         return None

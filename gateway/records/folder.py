@@ -78,7 +78,7 @@ class RecordsFolder:
 
 
 def default_folder(robot: str) -> Path:
-    """Under what systemd gives the service, else under the user's own state (XDG base directories)."""
+    """Return the folder below systemd's state directory, else below the user's own state (XDG)."""
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", robot).strip(".") or "robot"
     given = os.environ.get("STATE_DIRECTORY")
     if given:

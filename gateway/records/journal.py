@@ -125,7 +125,7 @@ class Journal:
         return {"utc_ns": time.time_ns(), "monotonic_ns": now_ns, "boot_id": self._boot_id}
 
     def _refusal(self, who: str, what: str, share: Share, size: int, now_ns: int) -> str | None:
-        """Why it is not written; the thread learns that there is something to sum up."""
+        """Return why it is not written; the thread learns that there is something to sum up."""
         with self._limiting:
             before = self._limits.patience_s(now_ns)
             refusal = self._limits.refusal(who, what, share, size, now_ns)
@@ -328,7 +328,7 @@ class Journal:
         return f"{why}; the journal begins anew, the old one is {kept.name}"
 
     def _make_room(self, file: BinaryIO) -> None:
-        """Where the file has got large: close it as a piece, and begin another one.
+        """Close a file that has got large as a piece, and begin another one.
 
         The old name is durable before there is a new file, so that a crash at any point leaves every line.
         """

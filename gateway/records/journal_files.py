@@ -38,7 +38,7 @@ class Tail(NamedTuple):
 
 
 def head_file(journal: Path) -> Path:
-    """Where the newest hash of a journal is kept."""
+    """Return the file that keeps the newest hash of a journal."""
     return journal.with_name(f"{journal.name}.head")
 
 
@@ -58,12 +58,12 @@ def read_head(journal: Path) -> Head | None:
 
 
 def closed_piece(journal: Path, last: int) -> ClosedJournalFile:
-    """How a piece is called that ends with this line."""
+    """Return the name of a piece that ends with this line."""
     return ClosedJournalFile(last, journal.with_name(f"{journal.name}.{last:012}"))
 
 
 def closed_pieces(journal: Path) -> list[ClosedJournalFile]:
-    """Those that are there, oldest first."""
+    """Return those that are there, oldest first."""
     try:
         paths = list(journal.parent.iterdir())
     except FileNotFoundError:
@@ -156,7 +156,7 @@ def lines_backwards(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _newest_first(journal: Path) -> Iterator[bytes]:
-    """Lines of all pieces. Pieces may be closed and removed meanwhile: each line is given once."""
+    """Yield lines of all pieces. Pieces may be closed and removed meanwhile: each line is given once."""
     oldest = None
     with contextlib.suppress(FileNotFoundError), journal.open("rb") as file:
         for oldest in lines_backwards(file):

@@ -85,7 +85,7 @@ class _LeftOut:
     counts: dict[str, int] = field(default_factory=dict)
 
     def entry(self, whose: str) -> Entry:
-        """As it is summed up."""
+        """Return it as it is summed up."""
         count = sum(self.counts.values())
         said = f"{count} more of {whose}'s were not written out"
         said += "; what must be written before it is done was refused"
@@ -102,7 +102,7 @@ class Limits:
         self._left_out: dict[str, _LeftOut] = {}
 
     def refusal(self, who: str, what: str, share: Share, size: int, now_ns: int) -> str | None:
-        """Why this entry is not written, in words; it is counted either way."""
+        """Return why this entry is not written, in words; it is counted either way."""
         found = self._account(client(who), share, now_ns)
         if found is None:
             return None
@@ -132,7 +132,7 @@ class Limits:
         left.counts[what] = left.counts.get(what, 0) + 1
 
     def _account(self, whose: str, share: Share, now_ns: int) -> tuple[str, _Account] | None:
-        """With its name; `None` for a stop of who has none, which is not left out because of strangers."""
+        """Return it with its name; `None` for a stop of who has none, which no stranger can crowd out."""
         key = whose, share is Share.ACT
         if key not in self._accounts and self._addresses[_address(whose)] >= 2 * NAMES_OF_ONE_ADDRESS:
             key = f"others of {_address(whose)}", share is Share.ACT
@@ -149,7 +149,7 @@ class Limits:
         return key[0], account
 
     def _forget_full(self, now_ns: int) -> None:
-        """Whoever has written nothing for a while has as much as who comes new.
+        """Forget who has written nothing for a while, and so has as much as who comes new.
 
         However many come, all accounts are not looked at for each of them.
         """

@@ -16,7 +16,7 @@ _TRIES: Final = 10
 
 
 def read_verified(journal: Path) -> list[Entry]:
-    """Every entry of a journal whose chain holds.
+    """Return every entry of a journal whose chain holds.
 
     Raises:
         Broken: it does not; the message says where.
@@ -47,7 +47,7 @@ def verified(journal: Path) -> Iterator[Entry]:
 
 
 def _open_all(journal: Path, opened: contextlib.ExitStack) -> list[BinaryIO]:
-    """Every piece, oldest first, as they are at one moment: a gateway may close one meanwhile."""
+    """Return every piece, oldest first, as they are at one moment: a gateway may close one meanwhile."""
     for _ in range(_TRIES):
         pieces = closed_pieces(journal)
         with contextlib.ExitStack() as tried:
@@ -77,7 +77,7 @@ def _before(file: BinaryIO) -> Head:
 
 
 def _removed(entry: Mapping[str, Any]) -> Head | None:
-    """Up to which line the journal says that it was shortened."""
+    """Return up to which line the journal says that it was shortened."""
     if entry.get("what") != SHORTENED:
         return None
     return Head(entry["up_to"], entry["up_to_hash"])

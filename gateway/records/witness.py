@@ -44,7 +44,7 @@ NOBODY: Final = "nobody else has seen it: name what a desk has kept with --witne
 
 
 def objection(head: SignedHead, key: str | None) -> str | None:
-    """Why this proves nothing about the robot with the key of this fingerprint; `None` where it does.
+    """Return why this proves nothing about the robot whose key has this fingerprint, else `None`.
 
     Raises:
         KeyProblem: nobody can say, because there is no program to do it.

@@ -86,7 +86,7 @@ class Feed:
         self.shed = shed
 
     def was_late_s(self) -> float:
-        """How late its rows were at most since this was asked last; forgotten by that."""
+        """Return its rows' largest delay since the last call, and forget it."""
         late_ns, self._late_ns = self._late_ns, 0
         return late_ns / 1e9
 
@@ -131,7 +131,7 @@ class TickFeed(Feed):
         self._timer = loop.call_later(0.0, self._tick)
 
     def shed_to(self, shed: int) -> None:
-        """Never below a row a second, where more were asked for."""
+        """Shed, but never below a row a second if more were asked for."""
         super().shed_to(min(shed, max(1, int(self.rate_hz))))
         self._period_ns = round(1e9 * self.shed / self.rate_hz)
         self._ticks_per_batch = max(1, round(BATCH_S * self.rate_hz / self.shed))

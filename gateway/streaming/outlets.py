@@ -41,7 +41,7 @@ class Batch:
 def encode_batch(
     stamps: Sequence[int], columns: Mapping[str, Sequence[float | None]], shed: int = 1
 ) -> Batch:
-    """Rows as they go on the wire; NaN becomes null."""
+    """Return rows as they go on the wire; NaN becomes null."""
     stamp_bytes, column_bytes = _encoder.encode(stamps), _encoder.encode(columns)
     size = len(stamp_bytes) + len(column_bytes)
     return Batch(len(stamps), msgspec.Raw(stamp_bytes), msgspec.Raw(column_bytes), size, shed)

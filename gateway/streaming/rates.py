@@ -18,7 +18,7 @@ class Rates:
         self._elapsed_s, self._looked_ns = (now_ns - self._looked_ns) / 1e9, now_ns
 
     def __call__(self, counter: Hashable, value: float) -> float | None:
-        """Its rate a second; `None` where it is new."""
+        """Return its rate a second; `None` where it is new."""
         self._now[counter] = value
         before = self._before.get(counter)
         return None if before is None or self._elapsed_s <= 0 else (value - before) / self._elapsed_s

@@ -84,7 +84,7 @@ class Wanted:
         return self._all or name in self._exact or any(one.match(name) for one in self._patterns.values())
 
     def meaningless(self, names: Collection[str]) -> Iterator[str]:
-        """Those of its names and globs that mean none of these."""
+        """Yield those of its names and globs that mean none of these."""
         for one in self._exact:
             pattern = self._patterns.get(one)
             if one not in names and (pattern is None or not any(map(pattern.match, names))):
@@ -92,7 +92,7 @@ class Wanted:
 
 
 def matches(name: str, globs: Sequence[str] | None) -> bool:
-    """Whether one of the globs means this name; no globs mean every name. For many names: `Wanted`."""
+    """Return whether a glob means this name; no globs mean every name. For many names: `Wanted`."""
     return globs is None or any(fnmatch.fnmatchcase(name, glob) for glob in globs)
 
 

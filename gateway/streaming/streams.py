@@ -98,7 +98,7 @@ class Streams:
             outlet.most_bytes = self._buffer_bytes // len(outlets)
 
     def _late_s(self) -> float:
-        """How late the latest feed was since this was asked last."""
+        """Return the delay of the latest feed since the last call."""
         return max((feed.was_late_s() for feed in self._feeds.values()), default=0.0)
 
     def _shed(self, factor: int) -> None:

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 
 def comments(struct: type[Struct]) -> dict[str, str]:
-    """By field: the comment behind it, also where a base class declares it."""
+    """Return the comment behind each field, also if a base class declares it."""
     found: dict[str, str] = {}
     for base in reversed(struct.__mro__):
         if issubclass(base, Struct) and base is not Struct:

@@ -91,7 +91,7 @@ class Decoding:
             self.complain(where, *((key, rest) if key in known else ("", text)))
 
     def _value(self, where: str, key: str, value: Any, kind: Any) -> bool:
-        """Whether it can be the value of a key of this type."""
+        """Return whether it can be the value of a key of this type."""
         before = len(self.findings)
         entry = _struct_of(kind)
         if entry is not None and isinstance(value, list):
@@ -121,7 +121,7 @@ class Decoding:
 
 
 def _explained(text: str, value: Any, kind: Any, key: str) -> str:
-    """With what is allowed, and what was likely meant."""
+    """Explain it, with what is allowed, and what was likely meant."""
     notes = [one for one in _leaves(kind) if isinstance(one, Meta)]
     title = next((one.title for one in notes if one.title), None)
     if title is not None and text.startswith("must have the form"):

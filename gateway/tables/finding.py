@@ -42,12 +42,12 @@ def told(findings: Iterable[Finding]) -> Iterator[Told]:
 
 
 def mistakes(findings: Iterable[Finding]) -> list[Finding]:
-    """Those for which the file is refused."""
+    """Return those for which the file is refused."""
     return [one for one in findings if one.severity is Severity.MISTAKE]
 
 
 def in_order(findings: Iterable[Finding], document: Mapping[str, Any]) -> list[Finding]:
-    """As the tables stand in the file; what is of no table comes first."""
+    """Return it as the tables stand in the file; what is of no table comes first."""
     tables = list(document)
 
     def place(one: Finding) -> tuple[int, int]:

@@ -24,7 +24,7 @@ class Places:
                 self._lines.setdefault(path[:length], line)
 
     def line(self, finding: Finding) -> int | None:
-        """Where the key stands, or else its table; `None` where neither is in the file."""
+        """Return the line of the key, or else of its table; `None` if neither is in the file."""
         found = _WHERE.fullmatch(finding.where)
         if found is None and finding.where != "the file":
             return None

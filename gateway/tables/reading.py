@@ -96,7 +96,7 @@ def _line_of(finding: Finding) -> int | None:
 
 
 def _is_wrong(lines: list[str], number: int) -> bool:
-    """Whether it is this line alone that is wrong, and no header."""
+    """Return whether it is this line alone that is wrong, and no header."""
     line = lines[number - 1] if number <= len(lines) else ""
     if not line.strip() or line.lstrip().startswith("["):
         return False

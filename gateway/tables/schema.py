@@ -14,7 +14,7 @@ DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
 def definitions(structs: Iterable[type[Struct]]) -> dict[str, Schema]:
-    """Each struct, and those that it is made of, by their names."""
+    """Return each struct, and those that it is made of, by their names."""
     wanted = list(structs)
     _, found = msgspec.json.schema_components(wanted, schema_hook=_path, ref_template="#/$defs/{name}")
     for struct in wanted:

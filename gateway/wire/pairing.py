@@ -62,23 +62,23 @@ def normal(code: str) -> str:
 
 
 def link(where: str, code: str) -> str:
-    """Where a robot pairs and its code in one, as its QR code says it."""
+    """Return a robot's pairing address and its code in one, as in its QR code."""
     return f"{SCHEME}{where}/{code}"
 
 
 def is_link(text: str) -> bool:
-    """Whether a text is meant as such a link; some readers of QR codes and keyboards write capitals."""
+    """Return whether a text is meant as such a link; some readers of QR codes write capitals."""
     return text.strip().lower().startswith(SCHEME)
 
 
 def has_code(text: str) -> bool:
-    """Whether a text has what looks like a code, which is then shown to nobody."""
+    """Return whether a text has what looks like a code, which is then shown to nobody."""
     is_path = text.lstrip().startswith(("/", ".", "~"))
     return not is_path and re.search(_CODE, text.upper()) is not None
 
 
 def of_link(text: str) -> tuple[str, str]:
-    """Both again; raises `ValueError` where the text is no such link."""
+    """Return both again; raises `ValueError` where the text is no such link."""
     where, slash, code = text.strip()[len(SCHEME) :].partition("/")
     if not (is_link(text) and where and slash):
         raise ValueError(f"a robot's link is {SCHEME}HOST:PORT/CODE, as it shows it")
@@ -92,6 +92,6 @@ def proof(whose: str, code: str, robot: str, desk: str) -> str:
 
 
 def proves(given: str, whose: str, code: str, robot: str, desk: str) -> bool:
-    """Whether a proof is right, in a time that tells nothing of it."""
+    """Return whether a proof is right, in a time that tells nothing of it."""
     expected = proof(whose, code, robot, desk)
     return hmac.compare_digest(given.encode("utf-8", "replace"), expected.encode("ascii"))

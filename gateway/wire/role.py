@@ -11,7 +11,7 @@ class Role(StrEnum):
     MAINTAINER = "maintainer"  # stores, restores, resets, enables, takes a lease over
 
     def includes(self, other: "Role") -> bool:
-        """Whether it may do what that one may."""
+        """Return whether this role may do what that one may."""
         return _RANKS[self] >= _RANKS[other]
 
 

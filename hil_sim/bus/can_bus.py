@@ -202,7 +202,7 @@ class CanBus:
         return all(disturbance.arrives(frame, sender, receiver) for disturbance in self.disturbances)
 
     def tell_error(self, error_class: int = BUS_ERROR) -> None:
-        """There was an error frame on the wire, or an interface's controller has changed its state."""
+        """Tell of an error frame on the wire, or of a new state of an interface's controller."""
         for on_error in tuple(self._error_listeners.values()):
             on_error(error_class)
 

@@ -25,7 +25,7 @@ _TCP_TABLE = Path("/proc/net/tcp")
 
 
 def _unread_by(peer: tuple[str, int], hub_port: int) -> bool:
-    """Whether the process at the other end, on this machine, has bytes from us that it did not read yet."""
+    """Return whether the process at the other end, on this machine, has yet to read bytes from us."""
     try:
         lines = _TCP_TABLE.read_text(encoding="ascii").splitlines()[1:]
     except OSError:

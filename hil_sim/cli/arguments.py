@@ -8,7 +8,7 @@ from hil_sim.gait.walks import NAMES, ORDINARY
 
 
 def add_wearer(parser: argparse.ArgumentParser) -> None:
-    """How the wearer walks, and which legs the robot is on."""
+    """Add how the wearer walks, and which legs the robot is on."""
     parser.add_argument(
         "--walks",
         choices=NAMES,

@@ -12,7 +12,7 @@ from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import VERBS
 
 _DESCRIPTION = """\
-Makes a fault in the robot of a running `gwrms sim --dir DIR`, or ends it. Without --for it stays until it is
+Make a fault in the robot of a running `gwrms sim --dir DIR`, or end it. Without --for it stays until it is
 cleared. --list explains every fault and its parameters.
 """
 
@@ -27,7 +27,7 @@ examples
   gwrms sim-fault --dir /tmp/robot --activity sit
   gwrms sim-fault --dir /tmp/robot --controller start     after a stop or a fault has made it wait
 
-by program
+from a program
   The socket DIR/control takes a line of JSON and answers with one: {"fault": "node_lost", "on": "left_knee",
   "for_s": 5}, {"fault": "bus_load", "params": {"percent": 100}}, {"clear": "all"}, {"activity": "sit"},
   {"controller": "start"}, {"list": true}. The last one lists every fault with its possible devices, its keys

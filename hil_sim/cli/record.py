@@ -25,8 +25,8 @@ from hil_sim.truth import phases
 from hil_sim.without_bus import BareExoskeleton
 
 _DESCRIPTION = """\
-Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and
-resolution of drives, insoles and IMU), together with what is really so. It needs no gateway and runs several
+Write what a gateway would report of the simulated robot (with its channel names, SI units, and the noise and
+resolution of drives, insoles and IMU), together with the ground truth. It needs no gateway and runs several
 times as fast as real time. Models learn from it: see gwrms docs explanation/prediction.
 """
 

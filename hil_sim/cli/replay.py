@@ -9,8 +9,8 @@ from hil_sim.cli.arguments import seconds, speed
 from hil_sim.replay.robot import ReplayedRobot
 
 _DESCRIPTION = """\
-Plays recordings as a robot: a gateway, or any other program, meets the recorded frames and bytes where it
-would meet a robot, on a CAN bus and on serial ports, as far apart in time as they were recorded.
+Play recordings as a robot: a gateway, or any other program, finds the recorded frames and bytes where it
+would find a robot, on a CAN bus and on serial ports, as far apart in time as they were recorded.
 """
 
 _EPILOG = """\

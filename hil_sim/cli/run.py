@@ -21,20 +21,20 @@ from hil_sim.scenario.shipped import locate, shipped
 from hil_sim.scenario.table import ScenarioError
 
 _DESCRIPTION = """\
-Runs scenario files: each with a simulated robot and a gateway of its own, as a process. What the files say
-happens to the robot, and what they expect of the gateway and of the robot is checked at the end.
+Run scenario files: each with a simulated robot and a gateway of its own, as a process. The files' events
+happen to the robot, and their expectations of the gateway and of the robot are checked at the end.
 """
 
 _EPILOG = f"""\
-An expectation that failed is inconclusive where this computer was too slow to judge: where, since the last
-thing that happened, the simulator came late and the gateway waited for a processor by more than a tenth of
-its window, or 0.2 s. What was met stays met.
+A failed expectation is inconclusive if this computer was too slow to judge it: if, since the last event, the
+simulator was late and the gateway waited for a processor by more than a tenth of the expectation's window, or
+0.2 s. An expectation that was met stays met.
 
-exit status: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
-file that is no scenario; 3 nothing failed, but something is inconclusive. gwrms docs scenarios tells how to
-write one.
+exit status: 0 all expectations are met; 1 one is not, or it could not be run; 2 wrong usage, or a file that
+is no scenario; 3 nothing failed, but something is inconclusive. gwrms docs scenarios explains how to write
+one.
 
-scenarios that ship, found by their names
+shipped scenarios, found by their names
   {", ".join(shipped())}
 
 examples

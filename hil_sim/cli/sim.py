@@ -19,9 +19,9 @@ from hil_sim.scenario.shipped import locate
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 _DESCRIPTION = """\
-A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen
-bus, two plantar-pressure insoles and a trunk IMU. A gateway, or any other program, meets it where it would
-meet a real robot: on a CAN bus and on serial ports.
+Simulate a whole lower-limb exoskeleton: six CiA 402 joint drives and a gait controller on a CANopen bus, two
+plantar-pressure insoles and a trunk IMU. A gateway, or any other program, finds it where it would find a real
+robot: on a CAN bus and on serial ports.
 """
 
 _EPILOG = """\
@@ -31,7 +31,7 @@ what is in DIR
   control          socket for faults while it runs: gwrms sim-fault --dir DIR …
   left_insole, right_insole, trunk
                    links to the sensors' pseudo-terminals; a reader at another baud rate than in robot.toml
-                   hears what it would hear on a wire. An IMU on the bus has none
+                   reads what it would read from a wire. An IMU on the bus has none
   stored           what the drives have stored (1010h), for the next start
   hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
   The same DIR keeps the same port and paths from start to start, also after a crash. One simulator at a time.
@@ -40,14 +40,14 @@ the bus
   --bus hub        a hub for any number of programs on this machine, at the simulated bit rate of 1 Mbit/s
   --bus socketcan:NAME
                    a CAN interface of Linux, virtual or a real adapter, beside whatever else is there. Order
-                   and time of the frames are then those of that bus, and error frames are not simulated. Who
-                   has a node id of a simulated one is looked for first and watched for later: then the
-                   simulator ends. When the interface goes, it says so, and waits until it is back.
+                   and time of the frames are then those of that bus, and error frames are not simulated. If
+                   another device has a simulated node id, at the start or later, the simulator ends. If the
+                   interface goes away, the simulator reports it, and waits until it is back.
   --unconfigured JOINTS
                    drives as their maker sends them: without a node id, silent, found and named by gwrms lss.
                    What LSS stores is in DIR/stored
-  --without NODES  leaves nodes to somebody else: real drives, another controller. The simulated controller
-                   enables drives, and leads simulated ones only: without a joint goes without gait
+  --without NODES  leaves nodes to other devices: real drives, another controller. The simulated controller
+                   enables drives, but only simulated ones: leave out gait, too, if you leave out a joint
 
 scenarios
   walk             stands up straight, then walks; three seconds after the start it walks evenly
@@ -65,11 +65,11 @@ scenarios
 
 the wearer
   --subject N is a person with a body and habits of their own, always the same for the same N; 0 is nominal,
-  and one in four has an impaired leg. --truth writes what is really so, as JSON lines: simulated and real
+  and one in four has an impaired leg. --truth writes the ground truth, as JSON lines: simulated and real
   time, label, phase of each leg, events, joints, forces under the feet, trunk. The first line names columns
   and units.
-  --walks NAME is how they walk; the affected leg is the left one of even N, the right one of odd N, and how
-  much each has of it is their own. gwrms docs bench says what is so in which:
+  --walks NAME is how they walk; the affected leg is the left one of even N, the right one of odd N, and each
+  wearer has a severity of their own. gwrms docs bench describes them:
     {walks}
   --assists left, or right, is a robot on one leg alone: its three drives, both insoles and the IMU. The other
   leg walks by itself. No PDO or SDO of the gait controller goes to the other three node ids.
@@ -82,19 +82,19 @@ the drives
   it. The joint behind it stays the same (4096 counts, gear 100); the controller sets such a drive up by SDO.
 
 sensors
-  --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
-  DIR/trunk` finds out which.
+  --imu and --insole choose their data formats, after the makers' manuals. `gwrms sensor DIR/trunk`
+  identifies the format.
 
 mistakes
-  --mistake NAME makes a mistake that people make, for gwrms doctor to find; again for more than one, none for
-  a robot that is well. The folder then has a file robot.toml of its own, and `computer`, the files of /sys
-  and /proc of the robot's computer, for gwrms doctor --computer DIR/computer.
+  --mistake NAME makes a typical mistake, for gwrms doctor to find; repeat it for more than one; none makes a
+  healthy robot. The folder then has a robot.toml of its own, and `computer`, the files of /sys and /proc of
+  the robot's computer, for gwrms doctor --computer DIR/computer.
 {mistakes}
 
 scenario files
   gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
-  gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
-  Those that ship are found by their names, as in gwrms sim run node_lost.
+  gwrms sim --script FILE   only plays its events, for a gateway of your own
+  Shipped ones are found by their names, as in gwrms sim run node_lost.
 
 recordings
   gwrms sim --dir DIR --replay FILE …

@@ -220,7 +220,7 @@ class GaitController(Node):
         self._move()
 
     def _settle(self) -> None:
-        """Nobody walks on with drives that have stopped: the wearer comes to rest."""
+        """Bring the wearer to rest: nobody walks on with drives that have stopped."""
         self.generator.step(self._period_s(), self.generator.at_rest, self._shape())
 
     def _period_s(self) -> float:

@@ -41,7 +41,7 @@ _NOT_VALID = 0x8000_0000  # bit 31 of a PDO's COB-ID
 
 
 def listen_to(dictionary: Dictionary, nodes: Sequence[int | None]) -> None:
-    """Have the drives of these node ids behind its PDOs and heartbeats, in the order of its sub-indices.
+    """Put the drives of these node ids behind its PDOs and heartbeats, in the order of its sub-indices.
 
     Where there is None, no frame goes to a drive, and none is listened to.
     """

@@ -211,7 +211,7 @@ class JointDrive(Node):
         self.power.fault(code)
 
     def _may_recover(self) -> bool:
-        """Whether every error is over, so that it can be reset."""
+        """Return whether every error is over, so that it can be reset."""
         return supervision.trouble(self.servo, self.supply_v, live=True) is None
 
     # -- life ------------------------------------------------------------------------------------------

@@ -201,7 +201,7 @@ class Objects:
         return _OTHERWISE[key] if entry is None else entry.number()
 
     def homing_methods(self) -> frozenset[int]:
-        """Those that 60E3h names; none where it names none."""
+        """Return those that 60E3h names; none where it names none."""
         keys = [key for key in self._counting if key[0] == HOMING_METHODS and key[1] > 0]
         return frozenset(number for key in keys if (number := self._counting[key].number()))
 

@@ -81,7 +81,7 @@ class Power:
         self._change(after(self.state, command))
 
     def _stays_stopping(self, command: Command) -> bool:
-        """Where 605Ah stays in QUICK STOP ACTIVE there is transition 16, elsewhere 12 at standstill."""
+        """Return whether 605Ah bars this transition: 12 if it stays in QUICK STOP ACTIVE, else 16."""
         if self.state is not PowerState.QUICK_STOP_ACTIVE:
             return False
         impossible = Command.STANDSTILL if options.stays(self._objects) else Command.ENABLE_OPERATION

@@ -40,7 +40,7 @@ def _processor(site: Site) -> Iterator[None]:
 
 
 def available_memory() -> int:
-    """Bytes that programs can still get."""
+    """Return bytes that programs can still get."""
     for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) * 1024

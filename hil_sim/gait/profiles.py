@@ -16,7 +16,7 @@ def rise(now: float, start: float, end: float) -> float:
 
 
 def bump(now: float, start: float, top: float, end: float) -> float:
-    """From 0 at `start` to 1 at `top` and back to 0 at `end`."""
+    """Return a bump, from 0 at `start` to 1 at `top` and back to 0 at `end`."""
     return rise(now, start, top) - rise(now, top, end)
 
 

@@ -34,7 +34,7 @@ class Rhythm:
         self.deviations = Deviations()
 
     def rest(self) -> None:
-        """Nobody walks: the next stride begins anew."""
+        """Rest: nobody walks, and the next stride begins anew."""
         self.phase = FIRST_PHASE
 
     def step(self, dt: float, cycle_time: float) -> None:

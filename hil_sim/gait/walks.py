@@ -134,7 +134,7 @@ class Walk:
     cycle_time: Range = _CYCLE_TIME
 
     def pace(self, step_length: float, cycle_time: float) -> tuple[float, float]:
-        """Where an ordinary wearer would go at this pace: step length (m) and cycle time (s)."""
+        """Return the step length (m) and cycle time (s) of an ordinary wearer at this pace."""
         return (
             _carried_over(step_length, _STEP_LENGTH, self.step_length),
             _carried_over(cycle_time, _CYCLE_TIME, self.cycle_time),
@@ -160,7 +160,7 @@ class OwnWalk:
         return min(ordinary + self.limbs[side].stance, _LONGEST_STANCE)
 
     def transfer(self, side: int, shares: tuple[float, float]) -> Transfer:
-        """When both feet stand, in this leg's stance; `shares` are both legs' of their strides."""
+        """Return when both feet stand, in this leg's stance; `shares` are both legs' of their strides."""
         strikes = 0.5 + (1 - 2 * side) * self.late  # of the other foot, in this leg's phase
         first, last = strikes + shares[1 - side] - 1.0, shares[side] - strikes
         return Transfer(max(first, _LEAST_TRANSFER) / shares[side], max(last, _LEAST_TRANSFER) / shares[side])
@@ -235,7 +235,7 @@ NAMES: Final = (ORDINARY, *WALKS)  # every choice, also in recordings: the group
 
 
 def own_walk(name: str, number: int) -> OwnWalk:
-    """How the person with this number walks, always the same; 0 has it as in the table.
+    """Return the walk of the person with this number, always the same; 0 has it as in the table.
 
     Even numbers are affected on the left, odd ones on the right.
     """

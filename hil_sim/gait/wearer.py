@@ -122,7 +122,7 @@ class Wearer:
         return max(posture.on_seat(generator.seating), generator.fall.on_ground)
 
     def _contacts(self) -> tuple[_Contact, _Contact]:
-        """Both feet; worked out once for each moment of the generator."""
+        """Return both feet; worked out once for each moment of the generator."""
         moment = self._generator.moment
         if moment != self._moment:
             self._moment, self._both = moment, (self._contact(LEFT), self._contact(RIGHT))

@@ -16,7 +16,7 @@ _ROOM_FOR_A_MODE = 0x0005_0008  # a dummy: eight bits that mean nothing
 
 
 def _hold(dictionary: Dictionary, key: Key, value: Value) -> None:
-    """From the next start on, as if it had been stored."""
+    """Hold it from the next start on, as if it had been stored."""
     entry = dictionary[key]
     entry.default = entry.value = value
     if entry.commissioned is not None:

@@ -210,7 +210,7 @@ class Lss:
         return _DONE
 
     def _activate(self, delay_ms: int) -> None:
-        """After the delay the other rate counts; the second one, of silence, is the master's to keep."""
+        """Use the other rate after the delay; the second one, of silence, is the master's to keep."""
 
         def change() -> None:
             self._activating = None

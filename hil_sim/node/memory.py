@@ -18,7 +18,7 @@ class Memory(Protocol):
         """Read the kept memory; raises `SimulatorError` for invalid contents."""
 
     def save(self, kept: Kept) -> None:
-        """When it returns, the values are kept; raises `OSError` where they cannot be."""
+        """Keep the values before returning; raises `OSError` if they cannot be kept."""
 
 
 class ProcessMemory:

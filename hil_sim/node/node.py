@@ -143,7 +143,7 @@ class Node:
         """Take a SYNC: RPDOs have taken effect, TPDOs are not yet sampled."""
 
     def _on_heartbeat(self, node_id: int, state: int) -> None:
-        """Another node has booted (`state` 0) or shown its heartbeat."""
+        """Take another node's boot-up (`state` 0) or heartbeat."""
 
     def _own_handlers(self) -> Iterable[tuple[int, Handler]]:
         """More identifiers whose frames the profile wants."""
@@ -383,4 +383,4 @@ class _Layer:
         self._node.reset_communication()
 
     def bitrate_changed(self) -> None:
-        """Whether it hears and is heard is asked at each frame."""
+        """Do nothing: each frame is checked by itself whether it hears and is heard."""

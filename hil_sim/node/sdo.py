@@ -133,6 +133,6 @@ class SdoServer:
 
 
 def _continues(request: bytes) -> bool:
-    """Whether a request has sense only within a transfer."""
+    """Return whether a request makes sense only within a transfer."""
     command = request[0] >> 5
     return command in (_DOWNLOAD_SEGMENT, _UPLOAD_SEGMENT) or bool(request[0] & _SUBCOMMAND.get(command, 0))

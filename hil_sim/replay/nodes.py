@@ -84,7 +84,7 @@ class RecordedNode:
         bus.attach(self, self._receive)
 
     def overheard(self, frame: Frame) -> None:
-        """Somebody else's SDO frame of the recording: it is not played, its value counts from now on."""
+        """Take somebody else's SDO frame of the recording: not played, but its value counts from now on."""
         shown = self._shown(frame)
         if shown is not None:
             self.dictionary.learn(*shown)
@@ -105,7 +105,7 @@ class RecordedNode:
         return _expedited(data) if command == _UPLOADED else None
 
     def _mappings(self) -> dict[int, Mapping]:
-        """Each PDO's mapping by its identifier."""
+        """Return each PDO's mapping by its identifier."""
         numbers = self.dictionary.number
         found: dict[int, Mapping] = {}
         for communication, mapping in (

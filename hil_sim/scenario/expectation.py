@@ -196,7 +196,7 @@ def _story(series: Sequence[tuple[float, Seen]]) -> str:
 
 
 def _changes(series: Sequence[tuple[float, Seen]]) -> Iterator[tuple[float, Seen]]:
-    """Each value that differs from the one before; of numbers in a row the first."""
+    """Yield each value that differs from the one before; of numbers in a row the first."""
     before: object = series
     for time_s, value in series:
         if value != before and not (isinstance(value, float) and isinstance(before, float)):

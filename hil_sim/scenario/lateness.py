@@ -38,7 +38,7 @@ class Lateness:
         clock.every(_PERIOD_NS, self._look)
 
     def doubt(self, timing: Timing, since_s: float, end_s: float) -> str:
-        """Why what failed may have failed for want of time between these, in words; "" with enough of it."""
+        """Return why time may have been too short between these, in words; "" if there was enough."""
         lost = [one for one in self._losses if since_s < one.time_s <= end_s + _PERIOD_S]
         simulator_s = sum(one.simulator_s for one in lost)
         gateway_s = sum(one.gateway_s for one in lost)

@@ -95,5 +95,5 @@ class Observer:
 
 
 def _stopped_by(rule: str, held: str) -> str:
-    """Why the robot is held stopped, where the stop's reason names this rule."""
+    """Return why the robot is held stopped, if the stop's reason names this rule."""
     return held if held.startswith(f"guard rule {rule}: ") else ""

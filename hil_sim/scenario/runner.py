@@ -120,7 +120,7 @@ def _run(script: Script, folder: Path, speed: float | None) -> ScenarioOutcome:
 
 
 def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
-    """Whether there is time for both; that a fault takes it from the gateway is what a scenario is for."""
+    """Watch whether both get time; a fault may take it from the gateway, as scenarios want."""
     waiting = Waiting(gateway.pid)
 
     def waited_s() -> float:

@@ -66,7 +66,7 @@ _CONDITIONS: Final[Mapping[str, Schema]] = {
 
 
 def schema() -> Schema:
-    """All of it."""
+    """Return all of it."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "scenario",

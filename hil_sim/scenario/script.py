@@ -212,7 +212,7 @@ def _check_gateway_line(table: Table, key: str) -> None:
 
 
 def _check_answers(lines: tuple[ScriptStep, ...], entries: object, mistakes: list[Mistake]) -> None:
-    """Only what this file asks for is answered."""
+    """Check that only what this file asks for is expected to be answered."""
     asked = {line.for_gateway for line in lines if line.for_gateway is not None}
     for number, entry in enumerate(entries if isinstance(entries, list) else (), 1):
         glob = entry.get("answer") if isinstance(entry, dict) else None

@@ -10,7 +10,7 @@ _WORKING_COPY: Final = Path(__file__).parents[2] / "scenarios"
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the scenarios that ship."""
+    """Return names of the scenarios that ship."""
     return tuple(sorted(file.stem for file in _folder().glob("*.toml")))
 
 

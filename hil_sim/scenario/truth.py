@@ -37,7 +37,7 @@ def names() -> tuple[str, ...]:
 
 
 def words(name: str) -> frozenset[str]:
-    """All that one of them may say; none where it is a number."""
+    """Return all that one of them may say; none where it is a number."""
     return _WORDS.get(name) or _WORDS.get(name.partition(".")[2], frozenset())
 
 

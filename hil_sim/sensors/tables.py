@@ -42,7 +42,7 @@ def tables(choice: SensorChoice, folder: Path) -> str:
 
 
 def companions(choice: SensorChoice) -> Mapping[str, str]:
-    """Names and contents of the files that the tables name."""
+    """Return names and contents of the files that the tables name."""
     return INSOLES[choice.insole][0].beside
 
 

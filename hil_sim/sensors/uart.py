@@ -23,7 +23,7 @@ def heard_at(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
 
 
 def _next_low(line: list[int], at: float) -> float | None:
-    """When the line is low next, from `at` on; `None` where it stays idle."""
+    """Return when the line is low next, from `at` on; `None` if it stays idle."""
     if _level(line, at) == 0:
         return at
     try:

@@ -64,7 +64,7 @@ def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
 
 
 def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
-    """Each subject's trial in which the first minute of walking ends."""
+    """Return each subject's trial in which the first minute of walking ends."""
     walked: dict[int, float] = {}
     ends: dict[int, int] = {}
     for trial in trials:
@@ -104,7 +104,7 @@ def _both(model: PhaseModel, early: Decisions, later: Decisions) -> Pair:
 
 
 def _cut(others: Decisions, minute: dict[int, int], judge: Decisions, settings: PhaseSettings) -> float:
-    """For a search: how much of the error adaptation takes away, over these people."""
+    """Return, for a search, how much of the error adaptation takes away, over these people."""
     people = [judge.of(judge.subject == person) for person in np.unique(judge.subject)]
     model = fitted(others, settings)
     parts = [(own, _late(own, minute)) for own in people]

@@ -109,7 +109,7 @@ def _detector(data: fall.Decisions, rows: folds.Rows) -> FallDetector:
 
 
 def _rows(data: fall.Decisions, recordings: int) -> Iterator[folds.Rows]:
-    """Each recording's decisions."""
+    """Yield each recording's decisions."""
     bounds = np.searchsorted(data.recording, np.arange(recordings + 1))
     yield from (np.arange(begin, end) for begin, end in pairwise(bounds))
 
@@ -144,7 +144,7 @@ def _of_walk(model: Any, trial: ipol.Trial) -> Told:
 
 
 def _spells(trial: ipol.Trial) -> Causes:
-    """From when to when somebody was in each state."""
+    """Return from when to when somebody was in each state."""
     bounds = [0, *(np.flatnonzero(np.diff(trial.status)) + 1), len(trial.status)]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ipol.STATUSES}
     for begin, end in pairwise(bounds):

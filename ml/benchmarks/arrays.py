@@ -61,7 +61,7 @@ class Arrays:
             raise self.problem(f"was sampled at {rate} Hz; this benchmark's features are for {hz} Hz")
 
     def columns(self, channels: Sequence[str]) -> list[int]:
-        """Where these channels are in `x`."""
+        """Return the places of these channels in `x`."""
         there = [str(name) for name in self.of("channels", 1)]
         if missing := [name for name in channels if name not in there]:
             raise self.problem(f"lacks the channels {', '.join(missing)}; it has {', '.join(there)}")

@@ -18,7 +18,7 @@ Groups = dict[str, dict[str, float]]
 
 
 def of_sets(probabilities: Floats, truth: npt.NDArray[np.int_], subject: Subjects) -> tuple[Flags, Flags]:
-    """Whether the set of each decision (n,) holds its truth, and whether it is one class, which is said."""
+    """Return whether each decision's set (n,) holds its truth, and whether it is one class, which is said."""
     above, sure = conformal.passed_over(probabilities, truth), probabilities.max(axis=1)
     covered, said = np.zeros(len(truth), dtype=bool), np.zeros(len(truth), dtype=bool)
     for one in np.unique(subject):
@@ -29,7 +29,7 @@ def of_sets(probabilities: Floats, truth: npt.NDArray[np.int_], subject: Subject
 
 
 def of_intervals(error: Floats, subject: Subjects) -> tuple[Flags, Floats]:
-    """Whether each error (n,) is within the interval of its subject, and half the interval's width (n,)."""
+    """Return whether each error (n,) is in its subject's interval, and half the interval's width (n,)."""
     width = np.zeros(len(error))
     for one in np.unique(subject):
         others = subject != one

@@ -129,7 +129,7 @@ def _counts(one: Seen) -> Floats:
 
 
 def _spans(danger: Floats) -> Iterator[tuple[int, int]]:
-    """From where on and up to where each danger is, and each time between two; not what is there first."""
+    """Yield where each danger begins and ends, and each time between two; not what is there first."""
     changes = (np.flatnonzero(np.diff(danger)) + 1).tolist()
     return pairwise([*changes, len(danger)])
 
@@ -182,7 +182,7 @@ def judge(one: Seen, calibration: Calibration) -> Judged:
 
 
 def events(judged: Judged, least: Level) -> Iterator[Event]:
-    """Every danger that did harm, and when its level was first reached."""
+    """Yield every danger that did harm, and when its level was first reached."""
     danger = judged.seen.danger
     for begin, end in _spans(danger):
         number = danger[begin]
@@ -230,7 +230,7 @@ def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - the
 
 
 def cross_judged(seen: Sequence[Seen]) -> list[Judged]:
-    """Each wearer as the calibration of others judges it."""
+    """Return each wearer as the calibration of others judges it."""
     subjects = sorted({one.subject for one in seen}, key=int)
     folds = min(FOLDS, len(subjects))
     found = []
@@ -242,7 +242,7 @@ def cross_judged(seen: Sequence[Seen]) -> list[Judged]:
 
 
 def outcome(judged: Sequence[Judged]) -> Outcome:
-    """Every figure."""
+    """Return every figure."""
     found = [event for one in judged for event in events(one, Level.ADVICE)]
     seen = [event for event in found if event.name not in SUDDEN]
     figures = shares("foreseen", [event.foreseen for event in seen])
@@ -314,7 +314,7 @@ def _mean(flags: Sequence[bool]) -> float:
 
 
 def reliability(judged: Sequence[Judged]) -> list[tuple[float, float, int]]:
-    """By tenths of what was said: the mean of it, the share that came true, how many moments."""
+    """Return, by tenths of what was said, its mean, the share that came true, how many moments."""
     said, true = _said(judged)
     bins = np.minimum((BINS * said).astype(np.int_), BINS - 1)
     return [

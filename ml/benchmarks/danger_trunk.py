@@ -67,7 +67,7 @@ class Person:
 
     @classmethod
     def of(cls, subject: str, calibration: Calibration) -> "Person":
-        """Somebody whom nobody knows yet."""
+        """Return somebody whom nobody knows yet."""
         return cls(subject, DangerMonitor(calibration))
 
     def take(self, rows: Floats, rate_hz: float, label: npt.NDArray[np.str_]) -> Judged:

@@ -76,7 +76,7 @@ Counts = Mapping[Key, int]
 
 
 def feet_of(trials: Sequence[ipol.Trial]) -> list[Foot]:
-    """Both feet of every trial."""
+    """Return both feet of every trial."""
     return [
         _foot(trial, recipe, mended(trial.samples[:, spin].T), in_air)
         for trial in trials
@@ -136,7 +136,7 @@ def _counted(model: EventModel, foot: Foot, share: float) -> Iterator[Key]:
 
 
 def _score(feet: Sequence[Foot], settings: EventSettings, train: folds.Rows, judge: folds.Rows) -> float:
-    """For a search: the mean F1 of both kinds."""
+    """Return, for a search, the mean F1 of both kinds."""
     model = _fitted([feet[row] for row in train], settings)
     counts: Counter[Key] = Counter()
     for row in judge:

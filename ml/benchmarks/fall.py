@@ -163,7 +163,7 @@ def _lossy_alarms(
 
 
 def _score(data: Decisions, train: folds.Rows, judge: folds.Rows, settings: FallSettings) -> float:
-    """For a search: falls alarmed in time, at about the same false alarms."""
+    """Return, for a search, the falls alarmed in time, at about the same false alarms."""
     alarmed = judge[_fitted(data, train, settings).alarms(data.features, data.recording, judge)]
     in_time = alarmed[data.to_impact[alarmed] <= IN_TIME]
     falls = judge[data.to_impact[judge] < FAR]

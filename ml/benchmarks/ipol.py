@@ -120,7 +120,7 @@ def strikes(in_air: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
 def phase(
     strikes: npt.NDArray[np.intp], rows: int, stride_s: tuple[float, float] = STRIDE_S
 ) -> npt.NDArray[np.float64]:
-    """Each row's gait phase: 0 at a heel strike, linear to the next one; NaN outside strides."""
+    """Return each row's gait phase: 0 at a heel strike, linear to the next one; NaN outside strides."""
     result = np.full(rows, np.nan)
     shortest, longest = (seconds * RATE_HZ for seconds in stride_s)
     for begin, end in itertools.pairwise(strikes):

@@ -117,7 +117,7 @@ _USED: Final = frozenset(channel for group in GROUPS.values() for channel in gro
 
 
 def examples_of(task: Task, variant: Variant, sessions: list[SimulatedSession], least: int) -> Examples:
-    """Decisions of all people, as this robot's sensors have them."""
+    """Return decisions of all people, as this robot's sensors have them."""
     recipe = recipe_of(task, variant)
     seen = disturbed(sessions) if variant.noisy else sessions
     return simulated.examples(task, recipe, seen, step_of(recipe, sessions, least))

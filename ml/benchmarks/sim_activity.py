@@ -147,7 +147,7 @@ def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
 
 
 def _steady(seen: Examples) -> npt.NDArray[np.bool_]:
-    """Decisions about moments that are no change's: those of one person in time's order."""
+    """Return decisions about moments that are no change's: those of one person in time's order."""
     changes = np.flatnonzero((seen.label[1:] != seen.label[:-1]) | (seen.subject[1:] != seen.subject[:-1]))
     steady = np.ones(len(seen.label), dtype=bool)
     reach = max(1, round(NEAR_NS / float(np.median(np.diff(seen.time_ns)))))

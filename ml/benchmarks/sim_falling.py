@@ -115,7 +115,7 @@ def _figures(seen: Examples, names: npt.NDArray[np.str_], likely: Any) -> dict[s
 
 
 def _alarms(seen: Examples, likely: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Decisions that end `DECISIONS` sure ones of the same person."""
+    """Return decisions that end `DECISIONS` sure ones of the same person."""
     alarms = likely >= SURE
     for back in range(1, DECISIONS):
         before = np.roll(likely, back) >= SURE
@@ -126,7 +126,7 @@ def _alarms(seen: Examples, likely: npt.NDArray[np.float64]) -> npt.NDArray[np.b
 
 
 def _events(seen: Examples, alarms: npt.NDArray[np.bool_], longest: int) -> Iterator[Event]:
-    """Every fall until its impact, and every stumble, with the first alarm within."""
+    """Yield every fall until its impact, and every stumble, with the first alarm within."""
     bounds = np.flatnonzero((seen.label[1:] != seen.label[:-1]) | (seen.subject[1:] != seen.subject[:-1])) + 1
     for begin, end in zip(bounds, [*bounds[1:], len(seen.label)], strict=True):
         label = str(seen.label[begin])

@@ -143,7 +143,7 @@ def _found(session: SimulatedSession, activity: Learned, phase: Learned) -> Foun
 
 
 def _errors(model: Learned, features: npt.NDArray[np.float32], truth: Floats) -> tuple[Floats, Flags]:
-    """Both legs' errors (n, 2), and whether a phase is said that is off by more than a tenth (n,)."""
+    """Return both legs' errors (n, 2), and whether a phase is said that is off by more than a tenth (n,)."""
     verdicts = model.judge(features)
     phases = np.stack([verdicts.values[side] for side in SIDES], axis=1)
     error = metrics.circular_error(phases, truth)

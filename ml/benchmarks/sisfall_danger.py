@@ -104,13 +104,13 @@ def fallen(judged: Judged, impact_s: float) -> Judged:
 
 
 def _stood(one: Watched) -> bool:
-    """Whether advice stood when the fall began."""
+    """Return whether advice stood when the fall began."""
     first = int(np.argmax(one.judged.seen.danger > HEALTHY))
     return bool(one.judged.level[max(first - 1, 0)] >= Level.ADVICE)
 
 
 def outcome(found: Sequence[Watched]) -> Outcome:
-    """Every figure."""
+    """Return every figure."""
     falls = [one for one in found if one.activity.startswith("F")]
     daily = [one for one in found if not one.activity.startswith("F")]
     said = [event for one in falls for event in events(one.judged, Level.ADVICE)]

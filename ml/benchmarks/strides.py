@@ -57,7 +57,7 @@ def own_lessons(trials: Sequence[ipol.Trial]) -> Decisions:
 
 
 def decisions(trials: Sequence[ipol.Trial], step: int = STEP) -> Decisions:
-    """Every trial's strides, a decision each `step` samples.
+    """Return every trial's strides, a decision each `step` samples.
 
     Raises:
         UnusableData: there is none of which to learn.
@@ -90,7 +90,7 @@ def _joined(*made: Decisions) -> Decisions:
 
 
 def apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
-    """Numbers counted on from list to list, so that no two lists share one."""
+    """Return numbers counted on from list to list, so that no two lists share one."""
     sizes = [int(own.max()) + 1 for own in numbers]
     offsets = np.cumsum([0, *sizes[:-1]])
     return np.concatenate([own + offset for own, offset in zip(numbers, offsets, strict=True)])
@@ -129,7 +129,7 @@ def _of_foot(
 
 
 def heel_strikes(pitch: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
-    """Where a foot's pitch rate falls through zero after a swing; with hindsight, for judging labels."""
+    """Return where a foot's pitch rate falls through zero after a swing; in hindsight, to judge labels."""
     if len(pitch) < AT_LEAST:
         return np.array([], dtype=np.intp)
     smooth = np.convolve(pitch, np.ones(3) / 3.0, mode="same")

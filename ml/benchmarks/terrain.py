@@ -117,7 +117,7 @@ def _predicted(
     splits: Sequence[folds.Split],
     search: Search,
 ) -> tuple[dict[float, Integers], list[TerrainSettings]]:
-    """By the share of lost packets, the predictions of the folds that had not seen a window."""
+    """Return, by the share of lost packets, the predictions of the folds that had not seen a window."""
     columns = every[0.0]
 
     def score(settings: TerrainSettings, train: folds.Rows, judge: folds.Rows) -> float:

@@ -103,7 +103,7 @@ def digest(card: Card) -> str:
 
 
 def encoded(card: Card) -> bytes:
-    """As `model.json` has it: for people too."""
+    """Return it as `model.json` has it: for people too."""
     return msgspec.json.format(msgspec.json.encode(card), indent=1) + b"\n"
 
 

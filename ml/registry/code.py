@@ -78,7 +78,7 @@ def _said(node: Any) -> Iterator[str]:
 
 
 def _is_text(node: Any) -> bool:
-    """Whether it is a docstring, or another string that nothing is done with."""
+    """Return whether it is a docstring, or another string that nothing is done with."""
     return (
         isinstance(node, ast.Expr)
         and isinstance(node.value, ast.Constant)

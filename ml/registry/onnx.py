@@ -55,7 +55,7 @@ def said(data: bytes, features: Features) -> dict[str, Any]:
 
 
 def differs(learned: Learned, data: bytes, features: Features) -> float:
-    """By how much the file says something else than the model: of a probability, or of a cycle.
+    """Return by how much the file differs from the model: of a probability, or of a cycle.
 
     A phase counts by its pointer's length: one of no length has none. A pointer that is a little shorter
     may be as sure as that: how sure it is can rise at once.

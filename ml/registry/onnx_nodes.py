@@ -14,7 +14,7 @@ _LEGS: Final = 2
 
 
 def cut_off(graph: Any) -> None:
-    """Between scale and network: what is far out says no more."""
+    """Cut off between scale and network what is far out: it says no more."""
     at = next(place for place, node in enumerate(graph.node) if node.op_type == "Scaler")
     scaled = graph.node[at].output[0]
     for node in graph.node:

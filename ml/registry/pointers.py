@@ -69,7 +69,7 @@ class Pointers:
         self._folder = f"{FOLDER}/{checked_name(task, 'task')}/{name}"
 
     def history(self) -> list[Pointer]:
-        """All of it.
+        """Return all of it.
 
         Raises:
             UnusableModel: a pointer is damaged or gone.

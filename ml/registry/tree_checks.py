@@ -24,7 +24,7 @@ def check_trees(state: Any) -> None:
 
 
 def _boosted(part: Any) -> Iterator[Any]:
-    """Every model of boosted trees within."""
+    """Yield every model of boosted trees within."""
     if isinstance(part, HistGradientBoostingClassifier):
         yield part
     elif isinstance(part, dict):

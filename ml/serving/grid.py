@@ -26,7 +26,7 @@ Piece = tuple[Stamps, Samples]  # grid points (n,) without a gap, ns; their samp
 
 
 def period_ns(recipe: Recipe) -> int:
-    """Between two points of the recipe's grid."""
+    """Return the time between two points of the recipe's grid."""
     return round(1e9 / recipe.rate_hz)
 
 

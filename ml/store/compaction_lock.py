@@ -35,7 +35,7 @@ class Claim(msgspec.Struct, frozen=True):
 
 @contextlib.contextmanager
 def alone(store: Store, location: str) -> Iterator[None]:
-    """While nobody else compacts this table.
+    """Keep others from compacting this table within the block.
 
     Raises:
         StoreError: somebody does.

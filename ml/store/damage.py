@@ -63,7 +63,7 @@ def proven(store: Store, file: DataFile, why: str) -> str:
 
 
 def _size_bytes(store: Store, file: DataFile) -> int | None:
-    """As Arrow sees it; None where it is not there."""
+    """Return it as Arrow sees it; None where it is not there."""
     with translated(f"{store.url}/{file.location}/{file.path} cannot be read"):
         found = store.files.get_file_info(f"{file.location}/{file.path}")
         return None if found.type == FileType.NotFound else int(found.size or 0)

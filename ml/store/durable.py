@@ -80,7 +80,7 @@ def create(file: Path, data: bytes) -> bool:
 
 @contextlib.contextmanager
 def unfinished(table: Path) -> Iterator[None]:
-    """While there may be commits of ours that do not last yet: nobody sets them aside within the block."""
+    """Keep others within the block from setting aside commits of ours that may not last yet."""
     with locks.of_folder(table / LOG, shared=True):
         yield
 
@@ -121,7 +121,7 @@ def read(entry: Path) -> Iterator[dict[str, Any]]:
 
 
 def _open(table: Path, newest: int, known: int) -> Iterator[Path]:
-    """From the newest entry back, as far as nobody knows that they last."""
+    """Yield from the newest entry back, as far as nobody knows that they last."""
     for version in range(newest, known, -1):
         file = log_entry(table, version)
         if not file.exists() or is_marked(file):  # not there: the log was cleaned below

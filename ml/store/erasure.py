@@ -153,7 +153,7 @@ def _holds(store: Store, path: str, sessions: Sequence[Name]) -> bool:
 
 
 def _locations(store: Store, sessions: Sequence[Name]) -> Iterator[tuple[str, Sequence[Name]]]:
-    """Where rows of theirs may be if there is such a table, and of which of them."""
+    """Yield where rows of theirs may be if there is such a table, and of which of them."""
     for table in TABLES:
         by_location: dict[str, list[Name]] = {}
         for robot, name in sessions:

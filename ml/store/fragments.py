@@ -117,7 +117,7 @@ def _log(delta: DeltaTable) -> dict[str, pa.ChunkedArray]:
 
 
 def _between(name: str, first: pa.Scalar, last: pa.Scalar) -> pyarrow.dataset.Expression:
-    """As Arrow has the times: made of Python's, an expression takes half a millisecond."""
+    """Return it as Arrow has the times: made of Python's, an expression takes half a millisecond."""
     if not (first.is_valid and last.is_valid):
         return _ALL
     return (_column(name) >= first) & (_column(name) <= last)

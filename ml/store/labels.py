@@ -106,7 +106,7 @@ def wearer(label: str) -> str | None:
 
 
 def counts(label: str) -> bool:
-    """Whether a label is more than words: models learn from it, or it is of the whole session."""
+    """Return whether a label is more than words: models learn from it, or it is of the whole session."""
     return label in (*ACTIVITIES, *INSTANTS, REGRESSION) or wearer(label) is not None
 
 

@@ -47,5 +47,5 @@ def opened_us(spool: str) -> int:
 
 
 def _place(row: Row) -> tuple[int, int, int]:
-    """Where in its spool."""
+    """Return its place in its spool."""
     return opened_us(str(row.get("spool") or "")), row.get("batch") or 0, row.get("number") or 0

@@ -31,5 +31,5 @@ def closed_folder(folder: Path) -> None:
 
 
 def opener(name: str, flags: int) -> int:
-    """For `open`: a new file is its owner's alone, and a link is not followed."""
+    """Open a file for `open`: a new one is its owner's alone, and a link is not followed."""
     return os.open(name, flags | os.O_NOFOLLOW | os.O_CLOEXEC, FILE)

@@ -245,7 +245,7 @@ def merged(
     begin: datetime | None = None,
     end: datetime | None = None,
 ) -> Iterator[pa.Table]:
-    """As `telemetry`, from several places with no row in common."""
+    """Yield it as `telemetry`, from several places with no row in common."""
     wanted = [
         piece for source in sources for piece in source.pieces if piece.rows and _within(piece, begin, end)
     ]

@@ -14,7 +14,7 @@ class Snapshot(Store):
         self._seen: dict[str, DeltaTable | NoSuchTable] = {}
 
     def table(self, location: str, version: int | None = None) -> DeltaTable:
-        """As `Store.table`; without `version` always the same one."""
+        """Return it as `Store.table`; without `version` always the same one."""
         if version is not None:
             return super().table(location, version)
         if location not in self._seen:

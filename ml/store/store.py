@@ -178,7 +178,7 @@ class Store:
             raise StoreError(str(found)) from None
 
     def mend(self, location: str) -> None:
-        """Before anything is built on a table in a folder: set aside what a power cut has torn off.
+        """Set aside what a power cut has torn off, before anything is built on a table in a folder.
 
         What is there is made to last, whoever wrote it: that may have been killed before.
 
@@ -264,7 +264,7 @@ class Store:
         return about
 
     def _has_lost_its_log(self, location: str) -> bool:
-        """Whether there are files of rows; a table's log is made before them."""
+        """Return whether there are files of rows; a table's log is made before them."""
         names = [found.path for found in self.objects.listing(location)]
         return not any(f"/{durable.LOG}/" in name for name in names) and any(
             name.endswith(".parquet") for name in names

@@ -39,7 +39,7 @@ class Table:
         return self.locations(shards)[shard_of(robot, shards)] if self.sharded else self.name
 
     def rows(self, fields: Sequence[Mapping[str, Any]]) -> pa.Table:
-        """Rows given as fields; times are integers in ns since 1970. What is not given is null.
+        """Return rows given as fields; times are integers in ns since 1970. What is not given is null.
 
         Raises:
             ValueError: a field that the table does not have, or a value of another type.

@@ -113,7 +113,7 @@ def newest(table: Path) -> int:
 
 
 def _end(table: Path) -> Iterator[Torn]:
-    """Where the log's end begins that is worth nothing: an entry is cut off, or the one before is missing."""
+    """Yield the log's worthless end: from an entry that is cut off, or whose predecessor is missing."""
     lasting, later = _ends(table)
     before = lasting[-1:]
     for file in later:
@@ -223,7 +223,7 @@ def _version(file: Path) -> int:
 
 
 def _is_settled(file: Path) -> bool:
-    """Whether it is not just being written; a hint comes after what it names, and is none without that."""
+    """Return whether it is not being written now; a hint comes after what it names, and needs it."""
     return file.name == HINT or abs(time.time() - file.stat().st_mtime) >= SETTLED_S
 
 
@@ -236,7 +236,7 @@ def _is_marked(lasting: Sequence[Path]) -> bool:
 
 
 def _may_go(lasting: Sequence[Path], file: Path) -> bool:
-    """Whether a whole entry was never acknowledged for sure, or nobody misses it."""
+    """Return whether a whole entry was surely never acknowledged, or nobody misses it."""
     return _is_marked(lasting) or _changes_nothing(file)
 
 
@@ -249,7 +249,7 @@ def _changes_nothing(entry: Path) -> bool:
 
 
 def _is_whole(table: Path, add: Mapping[str, Any]) -> bool:
-    """Whether a file can be read to its end, and has the size and the rows that the log says."""
+    """Return whether a file is readable to its end, with the size and the rows that the log says."""
     file = table / unquote(add["path"])
     try:
         if file.stat().st_size != add["size"]:

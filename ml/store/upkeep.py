@@ -207,7 +207,7 @@ def again(store: Store, location: str, work: Callable[[], Done]) -> Done:
 
 
 def retained(store: Store, location: str) -> datetime | None:
-    """Up to which time rows of the table were removed because they were old; None where none were.
+    """Return up to which time old rows of the table were removed; None if none were.
 
     Raises:
         StoreError: a note of that is damaged.
@@ -341,7 +341,7 @@ def _with_plain_texts(store: Store, location: str, files: Sequence[ParquetFileFr
 
 
 def _has_views(file: ParquetFileFragment) -> bool:
-    """Whether a text that has several values in it is written so."""
+    """Return whether a text that has several values in it is written so."""
     views = {column.name for column in file.physical_schema if column.type == pa.string_view()}
     told = (known for group in file.row_groups for name, known in group.statistics.items() if name in views)
     return any(known["min"] != known["max"] for known in told)
@@ -355,7 +355,7 @@ def _mend(store: Store, tables: Sequence[Table]) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Before the table format's library panics."""
+    """Check it before the table format's library panics."""
     if not os.access(folder, os.W_OK):
         raise StoreRefused(
             f"{folder} cannot be written: run this as whom it belongs to, on a disk for writing"
@@ -363,7 +363,7 @@ def _check_writable(folder: Path) -> None:
 
 
 def _locations(store: Store, tables: Sequence[Table]) -> list[str]:
-    """Where these tables lie, as far as something has been written to them."""
+    """Return where these tables lie, as far as something has been written to them."""
     found: list[str] = []
     for location in (location for table in tables for location in table.locations(store.about.shards)):
         try:

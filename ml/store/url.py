@@ -8,7 +8,7 @@ from ml.store.errors import StoreError
 
 
 def default_url() -> str:
-    """Under the user's own data (XDG base directories)."""
+    """Return the URL below the user's own data (XDG base directories)."""
     data = os.environ.get("XDG_DATA_HOME")
     folder = (Path(data) if data else Path.home() / ".local" / "share") / "gwrms" / "store"
     return folder.as_uri()

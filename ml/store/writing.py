@@ -84,7 +84,7 @@ def _file(objects: Objects, location: str, partition: Partition, rows: pa.Table,
 
 
 def _encoded(rows: pa.Table) -> pa.Buffer:
-    """As measured in docs/adr/0009; with statistics, which count the samples of a channel."""
+    """Return it as measured in docs/adr/0009; with statistics, which count the samples of a channel."""
     numbers = [field.name for field in rows.schema if pa.types.is_float64(field.type)]
     out = pa.BufferOutputStream()
     pq.write_table(

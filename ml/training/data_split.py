@@ -34,7 +34,7 @@ def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
 
 
 def judging(parts: Sequence[SessionDecisions]) -> list[SessionDecisions]:
-    """Those that may judge: one without a wearer's name may be of any wearer that has one."""
+    """Return those that may judge: one without a wearer's name may be of any wearer that has one."""
     return [each for each in parts if each.named] or list(parts)
 
 
@@ -84,7 +84,7 @@ def _known(name: str, known: Sequence[str], others: int) -> str:
 
 
 def _place(name: str) -> float:
-    """From 0 to 1, the same for ever."""
+    """Return a place from 0 to 1, the same for ever."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8]) / 2**64
 
 

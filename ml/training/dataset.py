@@ -128,7 +128,7 @@ def _part(ask: Ask) -> SessionDecisions:
 
 
 def _decisions(recipe: Recipe, rows: Recorded) -> tuple[Features, Instants, Samples]:
-    """Features of every full window that a decision is due about, its newest stamp, and the ranges."""
+    """Return features of every full window that a decision is due about, its newest stamp, and the ranges."""
     _check_rows(recipe, rows)
     every_ns = EVERY_MS[recipe.name.partition("/")[0]] * 1_000_000
     parts, stamps, seen = [], [], []
@@ -170,7 +170,7 @@ def _worst(recipe: Recipe, values: Samples) -> str:
 
 
 def _check_units(store: Store, ask: Ask, recipe: Recipe) -> None:
-    """By what the robot said of its channels when the session began, else by the table's columns."""
+    """Check units by the robot's description at the session's start, else by the table's columns."""
     units = store.units(TELEMETRY.location(ask.robot, store.about.shards))
     for row in newest(_rows(store, SESSIONS, ask)):
         units |= json.decode(row["units"] or "{}")
@@ -188,7 +188,7 @@ def _labels(store: Store, ask: Ask) -> list[Label]:
 
 
 def _said(labels: Sequence[Label], rows: Recorded) -> list[LabelSpan]:
-    """On the robot's clock."""
+    """Return the labels on the robot's clock."""
     times = np.array([(each.began_utc_ns, each.ended_utc_ns) for each in labels], np.int64).reshape(-1, 2)
     begins, ends = (rows.at_utc(column).tolist() for column in times.T)
     return [
@@ -247,7 +247,7 @@ def _version(store: Store, ask: Ask) -> int:
 
 
 def _rows(store: Store, table: Table, ask: Ask) -> list[dict[str, Any]]:
-    """Those of the session; none where the table was not there yet."""
+    """Return those of the session; none where the table was not there yet."""
     if table.name not in ask.versions:
         return []
     field = pyarrow.dataset.field

@@ -132,7 +132,7 @@ def _unable(lacking: Sequence[str]) -> str:
 
 
 def _losses(task: Task, found: Judged) -> Iterator[str]:
-    """Where the new model is much worse."""
+    """Yield where the new model is much worse."""
     new, old = found.new, found.serving
     if old is None:
         return
@@ -151,7 +151,7 @@ def _losses(task: Task, found: Judged) -> Iterator[str]:
 
 
 def _percents(task: Task, *figures: float) -> list[str]:
-    """As tables show them, `95.2 %`; with more digits where else they would look alike."""
+    """Return it as tables show them, `95.2 %`; with more digits where else they would look alike."""
     scale = 100.0 if task.fold else 1.0  # an error of the stride is in percent already
     for digits in range(1, 4):
         told = [f"{scale * figure:.{digits}f} %" for figure in figures]
@@ -161,7 +161,7 @@ def _percents(task: Task, *figures: float) -> list[str]:
 
 
 def _points(task: Task, lost: float) -> str:
-    """How much is lost, on the same scale."""
+    """Return how much is lost, on the same scale, in words."""
     return f"{100 * lost if task.fold else lost:.1f} points"
 
 
@@ -207,7 +207,7 @@ def _classes(new: Learned, parts: Sequence[SessionDecisions], serving: Learned |
 
 
 def _metrics(learned: Learned, parts: Sequence[SessionDecisions], classes: Sequence[str]) -> Metrics:
-    """How right it is in terms of these classes."""
+    """Return the figures in terms of these classes."""
     parts = [each for each in parts if len(each.truth)]
     if not parts:
         return Metrics()

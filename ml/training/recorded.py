@@ -66,7 +66,7 @@ def _values(table: pa.Table, name: str) -> npt.NDArray[np.float64]:
 
 
 def _mapped(instants: Instants, one: Instants, other: Instants) -> Instants:
-    """From one clock to the other: the difference, small beside the times, lies on a line between rows."""
+    """Map from one clock to the other: the difference, small beside the times, is on a line between rows."""
     difference = other - one
     small = np.interp(instants - one[0], np.maximum.accumulate(one - one[0]), difference - difference[0])
     mapped: Instants = instants + difference[0] + np.rint(small).astype(np.int64)

@@ -69,7 +69,7 @@ _HEAD: Final = msgspec.json.Decoder(_Head)
 
 
 def read(path: Path) -> list[SimulatedSession]:
-    """Every session of a file.
+    """Return every session of a file.
 
     Raises:
         UnusableData: it is no such file, or damaged.

@@ -136,7 +136,7 @@ def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
 
 
 def told(left_out: LeftOut) -> str:
-    """Why a session is left out, for people."""
+    """Return why a session is left out, for people."""
     return f"{left_out.ask.session} of {left_out.ask.robot}: {left_out.why}"
 
 

@@ -53,7 +53,7 @@ class Material:
     def parts(
         self, recipe: Recipe, teacher: str = "", least: float = 1.0
     ) -> tuple[list[SessionDecisions], list[LeftOut]]:
-        """Every session's decisions with a recipe's features, and the sessions without any."""
+        """Return every session's decisions with a recipe's features, and the sessions without any."""
         asks = [
             Ask(self.store.url, self.versions, each.robot, each.session, recipe.name, teacher, least)
             for each in self.sessions

@@ -75,7 +75,7 @@ def phases(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Samples, Names]:
 def _leg(
     said: Sequence[LabelSpan], strike: str, at_ns: Instants
 ) -> tuple[npt.NDArray[np.float64], LabelSource]:
-    """By the most trusted source that has seen two strikes."""
+    """Return a leg's phase, by the most trusted source that has seen two strikes."""
     for source in LabelSource:
         strikes = np.unique([e.begin_ns for e in said if e.label == strike and e.source is source])
         if len(strikes) > 1:

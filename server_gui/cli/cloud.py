@@ -14,20 +14,20 @@ from server_gui.cli.cloud_witnesses import witnesses
 
 USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 
-  ls          tables, or with --path the files below one
-  du          space used by tables and robots
-  verify      is every file there and whole, and every row that the spool has sent
-  mend        what verify found: missing files taken out, their rows brought again from the spool
-  upload      what waits in the spool, now; or with --from a whole store
-  download    a store, or some robots or sessions of it, into a folder
-  compact     put small files together
-  retain      remove what is older than so many days
+  ls          list tables, or with --path the files below one
+  du          show the space used by tables and robots
+  verify      check that every file is whole, and that every row that the spool has sent is there
+  mend        repair what verify found: take missing files out, restore their rows from the spool
+  upload      upload pending data of the spool now; or with --from copy a whole store
+  download    download a store, or some robots or sessions of it, to a folder
+  compact     merge small files
+  retain      remove rows older than a number of days
   vacuum      delete files that no newer version needs
-  forget      everything of one wearer, for good
-  witnesses   what this desk has seen of a robot's journal, to prove it by
+  forget      remove everything of one wearer, for good
+  witnesses   print what this desk has seen of a robot's journal, as proof
 
-URL is file:///folder or s3://bucket/prefix; without it, the store of the server's file. Keys come from the
-AWS environment or profile alone. gwrms cloud COMMAND --help says more.
+URL is file:///folder or s3://bucket/prefix; without it, the store of the server's file. Keys come only from
+the AWS environment or profile. gwrms cloud COMMAND --help says more.
 """
 COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
     "ls": ls,

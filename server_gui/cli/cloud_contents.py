@@ -19,12 +19,12 @@ from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import SettingsError
 
 VERIFY: Final = (
-    "Check every file of every table, and that each row which this computer's spool has sent is there once,\n"
-    "as it was sent."
+    "Check every file of every table, and that each row sent by this computer's spool is there once,\n"
+    "unaltered."
 )
-VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole, and each line names what is missing, doubled
-or altered. 2: it could not look: no store there, or not reached. What was sent is known from the spool's
-receipts; where there are none, files alone are checked, and it says so. It reads all that has a receipt."""
+VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole; each line names what is missing, duplicate or
+altered. 2: it could not check: no store there, or unreachable. The spool's receipts show what was sent;
+without receipts only files are checked, and the output says so. All data with a receipt is read."""
 NOT_WHOLE: Final = 1
 NOT_LOOKED: Final = 2
 COLUMNS = ("FILES", "ROWS", "SIZE", "FROM (UTC)", "TO")

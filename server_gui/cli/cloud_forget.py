@@ -20,25 +20,25 @@ from server_gui.core.recording.spool import Spool
 WHAT = (
     "Remove a wearer's sessions: rows, labels, predictions, of every version; and prove that they are gone."
 )
-EPILOG = """A wearer's are the sessions that were recorded with --wearer, or labelled with one; P01, p01 and
-"P01 " are one. End every collector that writes to this store first. What waits in the spool is uploaded, rows
-are deleted from all tables but the robots' own journals (who operated them, and nothing of a wearer), files
-that only older versions need are deleted at once, and second copies in the spool with rows of theirs too.
-An event in the recording says that it was done, and names the wearer by a hash alone. Then every file is
-read again.
+EPILOG = """A wearer's sessions are those recorded with --wearer, or labelled with one; P01, p01 and "P01 "
+are the same. End every collector that writes to this store first. Pending data of the spool is uploaded; rows
+are deleted from all tables except the robots' own journals (they name operators, and nothing of a wearer);
+files that only older versions need are deleted at once, and so are second copies in the spool that have such
+rows. An event in the recording reports this, and names the wearer by a hash only. Then every file is read
+again.
 
-Files that this user has exported on this computer are removed where they are as they were made; those that
-have changed, and copies of the store (cloud download), are named, as are the spools of other computers that
-have written to this store: run the same command there too.
+Files that this user exported on this computer are removed if they are unchanged and in their place. Changed
+ones, copies of the store (cloud download), and the spools of other computers that have written to this store
+are named: run the same command there too.
 
-Versions that models name keep what was in them: with such it is refused, and --unpin lets these
-versions go. A model that learned from these sessions stays, and is named. Not known here, and yours to
-remove: what others have exported, what was saved from a window's plots or a query, backups, and old versions
-that a bucket itself keeps.
+Versions that models name keep their contents: then the command refuses, and --unpin releases these versions.
+A model that learned from these sessions stays, and is named. Not known here, and yours to remove: what others
+have exported, what was saved from a window's plots or a query, backups, and old versions that a bucket itself
+keeps.
 
-Interrupted, the same command goes on. Exit status 0: gone, as is proven; 1: something is left, or was not
-removed, and it says what; 2: not looked; 3: gone from store and spool, but what was exported here was moved,
-and is for you to find."""
+After an interruption, the same command continues. Exit status 0: gone, and proven; 1: something is left, or
+was not removed, and is named; 2: not checked; 3: gone from store and spool, but exported files were moved,
+and are yours to find."""
 OUT_OF_REACH = 3
 
 

@@ -11,13 +11,13 @@ from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
 from server_gui.cli.cloud_options import add_url, parser, reach, when
 
-COMPACT_EPILOG = """An upload brings a file a robot; some thousands of small files make a table slow to
-open. Once an hour or a day is enough. Writers and readers are not disturbed, and older versions stay as
-they are."""
-RETAIN_EPILOG = """Rows go from the newest version only: older versions, and those that models were made
-from, still have them until gwrms cloud vacuum. By default telemetry and resources; sessions, events,
+COMPACT_EPILOG = """An upload adds a file per robot; some thousands of small files make a table slow to open.
+Once an hour or a day is enough. Writers and readers are not disturbed, and older versions stay as they
+are."""
+RETAIN_EPILOG = """Rows are removed from the newest version only: older versions, and those that models
+learned from, keep them until gwrms cloud vacuum. By default telemetry and resources; sessions, events,
 journals and labels are small."""
-VACUUM_EPILOG = """Compaction and retention leave the files of older versions where they are. This deletes
+VACUUM_EPILOG = """Compaction and retention leave the files of older versions in place. This command deletes
 them, except those of versions that are younger than --grace days, or that a model names."""
 
 MOST_DAYS = 36_500
@@ -25,7 +25,7 @@ MOST_DAYS = 36_500
 
 def compact(argv: list[str]) -> int:
     """Run `gwrms cloud compact`."""
-    arguments = _parser("compact", "Put small files together.", COMPACT_EPILOG).parse_args(argv)
+    arguments = _parser("compact", "Merge small files.", COMPACT_EPILOG).parse_args(argv)
     done = upkeep.compact(_writable(arguments), dry_run=arguments.dry_run)
     if arguments.json:
         say_json(done)
@@ -38,7 +38,7 @@ def compact(argv: list[str]) -> int:
 
 def retain(argv: list[str]) -> int:
     """Run `gwrms cloud retain`."""
-    made = _parser("retain", "Remove rows that are older than so many days.", RETAIN_EPILOG)
+    made = _parser("retain", "Remove rows older than a number of days.", RETAIN_EPILOG)
     made.add_argument("--days", type=_days, required=True, metavar="N", help="the greatest age of rows")
     made.add_argument("--table", action="append", choices=TABLES, help="only this table; repeatable")
     made.add_argument("--yes", action="store_true", help="do not ask for confirmation")

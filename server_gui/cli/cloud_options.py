@@ -29,7 +29,7 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         allow_abbrev=False,
     )
     made.add_argument("--config", type=Path, metavar="FILE", help="the server's file, which names the store")
-    made.add_argument("--json", action="store_true", help="for programs")
+    made.add_argument("--json", action="store_true", help="print JSON, for programs")
     return made
 
 

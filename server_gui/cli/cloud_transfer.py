@@ -21,19 +21,19 @@ from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import load
 
-UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
-that runs owns the spool; then it is asked to do so.
+UPLOAD_EPILOG = """Without --from: pending data of this computer's spool goes to the store now. A running
+collector owns the spool, and is asked to upload it.
 
-With --from: a whole store is copied to URL, with its versions and with what says which batches are in it,
-so that the server can go on there: end the collector, copy, write the new URL into the server's file, start
-it.
+With --from: a whole store is copied to URL, with its versions and its record of batches, so that the server
+can continue there: end the collector, copy, write the new URL into the server's file, start the collector
+again.
 
 examples
   gwrms cloud upload
   gwrms cloud upload s3://bucket/gwrms --from file:///home/me/.local/share/gwrms/store"""
-DOWNLOAD_EPILOG = """Interrupted, the same command goes on where it ended. A whole store comes with its
-versions; each file is compared by its MD5, where the service says it, else by its size (gwrms cloud verify
---deep reads all). Robots and sessions come as rows, counted.
+DOWNLOAD_EPILOG = """After an interruption, the same command continues. A whole store keeps its versions; each
+file is compared by its MD5, if the service gives it, otherwise by its size (gwrms cloud verify --deep reads
+everything). Robots and sessions are copied as rows, and counted.
 
 examples
   gwrms cloud download s3://bucket/gwrms --out copy

@@ -6,7 +6,7 @@ from server_gui.cli.cloud_options import NO_SPOOL, add_url, parser, reach, spool
 from server_gui.core.cloud.witnesses import witnesses as kept
 
 EPILOG = """One JSON object a line: an entry's number and hash, signed by the robot's key. Keep them
-elsewhere than on the robot. exit status: 0 there are some; 1 there are none
+anywhere but on the robot. exit status: 0 there are some; 1 there are none
 
 example
   gwrms cloud witnesses exo-01 > exo-01.witnesses

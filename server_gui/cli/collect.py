@@ -38,14 +38,14 @@ RIGHT = range(5, len(HEADER))
 PREDICTED = ("robot", "task", "says", "probability", "age", "trust", "model")
 LABELLED = ("robot", "task", "model", "labelled", "right", "wrong", "not said")
 
-EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
-at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
-itself: one that is off is tried again until it is there. End it with Ctrl-C or SIGTERM: sessions are ended,
-and what waits is uploaded, for 20 s at most.
+EPILOG = """A robot's data is saved in the spool on this computer first, and goes to the store in batches;
+nothing is decimated, and what is missing is recorded as an event. Each robot is followed separately: one that
+is off is tried again until it answers. End the collector with Ctrl-C or SIGTERM: sessions are ended, and
+pending data is uploaded, for 20 s at most.
 
 the server's file (without --config: ~/.config/gwrms/server.toml, if it is there)
   [robots]
-  exo-01 = "192.0.2.7:7420"        # the name that it has in the store
+  exo-01 = "192.0.2.7:7420"        # its name in the store
 
   [store]
   url = "s3://bucket/prefix"       # default: a folder, file:///home/YOU/.local/share/gwrms/store
@@ -56,11 +56,11 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
                                    # or more than 2 GiB wait; manual: with --upload
   rate_hz = 100                    # rows a second; 0: every sample of every source
   channels = ["*"]                 # names or globs
-  resources_s = 5                  # between looks at the robots' computers
-  batch_s = 60                     # of recording that go to the store together
+  resources_s = 5                  # period of measuring the robots' computers
+  batch_s = 60                     # length of recording in one upload
 
   [prediction]
-  enabled = true                   # what models say of each robot is recorded too; gwrms docs predict
+  enabled = true                   # predictions are recorded, too: gwrms docs predict
 
 examples
   gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"
@@ -69,8 +69,8 @@ examples
   gwrms collect --unit | sudo tee /etc/systemd/system/gwrms-collect.service
 
 exit status
-  0 ended as asked, or a collector has answered; 1 it cannot record, nobody answers, its last
-  upload did not succeed (--upload), or rows are lost that no event tells; 2 usage"""
+  0 ended as asked, or a collector has answered; 1 it cannot record, no collector answers, its last
+  upload failed (--upload), or rows are lost without an event; 2 usage"""
 
 
 def main(argv: list[str]) -> int:
@@ -205,7 +205,7 @@ def _predicted(state: PredictingState | None) -> list[str]:
 
 
 def _labelled(found: Figures) -> str:
-    """How right predictions were, where labels say what was so."""
+    """Return how right predictions were, by labels."""
     if not found:
         return f"no prediction of the last {WITHIN_DAYS} days is labelled in the store (gwrms label)\n"
     rows = [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from server_gui.qt_needs import can_open
 
-EPILOG = """Where there is a display, the view is the window (gwrms gui --help); else it is in the terminal.
+EPILOG = """If there is a display, the view is the window (gwrms gui --help); otherwise it is in the terminal.
 
 keys in the terminal
   s, space     STOP: quick stop on every drive (software, not safety-rated)

@@ -19,10 +19,10 @@ from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import chart, record, what, whole
 
 EPILOG: Final = """commands
-  gwrms edits            every edit, A/B trial and sweep, oldest first: when, who, what, what it did
-  gwrms edits show ID    one of them: every metric before and after, with its interval
+  gwrms edits            list every edit, A/B trial and sweep, oldest first: when, who, what, its effect
+  gwrms edits show ID    show one of them: every metric before and after, with its interval
 
-Evidence is found by the desk that records the robot (the window, or gwrms collect) while somebody walks
+Evidence is gathered by the desk that records the robot (the window, or gwrms collect) while somebody walks
 before and after the edit; gwrms docs how-to/judge-an-edit explains the words.
 
 exit status

@@ -15,10 +15,9 @@ from ml.store.private import private_files
 EPILOG = f"""benchmarks
 {chr(10).join(f"  {one.name:<18} {one.asks}" for one in BENCHMARKS.values())}
 
-The recordings are .npz files of their own; gwrms docs explanation/prediction says where they come from and
-what is in them.
-Those of sim-… are synthetic: gwrms sim-record writes them.
-Subjects are never on both sides, seeds are fixed and features look back only. Settings are fixed in the code;
+The recordings are .npz files; gwrms docs explanation/prediction describes their origin and contents.
+Those of sim-… are synthetic, written by gwrms sim-record.
+No subject is on both sides, seeds are fixed, and features only look back. Settings are fixed in the code;
 --search chooses them again in every fold, by the training subjects alone, which takes many times as long.
 
 examples

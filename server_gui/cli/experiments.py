@@ -72,7 +72,7 @@ example:
   gwrms ab left_knee.position_gain 3000 2400
 {EXIT}"""
 SWEEP: Final = f"""{RULES}
-Somebody has to watch: it ends too when this command goes into the background, or its standard input ends.
+Somebody has to watch: the sweep also ends if this command goes into the background, or its input ends.
 
 example:
   gwrms sweep left_knee.position_gain 2400 3600 200
@@ -154,7 +154,7 @@ def _add_shared(made: argparse.ArgumentParser) -> None:
 
 
 def _spaced(argv: list[str]) -> list[str]:
-    """With a space before what is below zero: argparse would take -3deg for an option."""
+    """Put a space before what is below zero: argparse would take -3deg for an option."""
     return [f" {word}" if NEGATIVE.match(word) else word for word in argv]
 
 
@@ -267,7 +267,7 @@ def _begin(plan: ExperimentPlan, followed: FollowedRobot, ending_: ShutdownSigna
 def _follow(
     run: Run, followed: FollowedRobot, ending_: ShutdownSignals, arguments: argparse.Namespace
 ) -> None:
-    """Until it is over; whoever asks to end it waits for what is read back."""
+    """Follow it until it is over; whoever asks to end it waits for what is read back."""
     said = ""
     while not run.is_over:
         followed.update()
@@ -286,7 +286,7 @@ def _follow(
 
 
 def _is_watched(run: Run) -> bool:
-    """Whether this command is in the foreground; a line on its standard input ends the experiment."""
+    """Return whether this command is in the foreground; a line on its standard input ends the experiment."""
     try:
         if sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
             return False
@@ -301,7 +301,7 @@ def _is_watched(run: Run) -> bool:
 
 
 def _say_progress(run: Run, said: str, arguments: argparse.Namespace) -> str:
-    """On a terminal a line that stays in its place; elsewhere one for each value."""
+    """Say it on a terminal in a line that stays in its place; elsewhere in one for each value."""
     if arguments.json:
         now = f"{run.state.name} {run.place}"
         if now != said:

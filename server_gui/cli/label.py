@@ -25,12 +25,13 @@ EPILOG = f"""labels that models learn from
   instants (no --to)   {", ".join(INSTANTS)}
 Others are kept and shown as well. Times are UTC, or seconds since the session's first sample.
 
-A label is kept once however often it is given. Taken back, it holds no more; that it was there stays in the
-table. Of one author two activities at one time contradict each other and are refused; two people may differ.
+A label is kept once, however often it is given. A removed label no longer counts; the table still shows that
+it existed. Two activities of one author at one time contradict each other and are refused; two authors may
+differ.
 
 examples
   gwrms label 20261121T1530 walk --from 10 --to 70
-  gwrms label 20261121T1530 --wearer P03           # so that no model is judged by whom it learned from
+  gwrms label 20261121T1530 --wearer P03           # so that no model is judged by a wearer it knows
   gwrms label 20261121T1530 --regression           # a test that every model must pass
   gwrms label 20261121T1530 --file labels.csv      # with the columns from,to,label
   gwrms label 20261121T1530 --gait-events          # heel strikes and toe offs, as the sensors show them

@@ -27,27 +27,27 @@ from server_gui.core.settings.server_file import load
 
 USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
 
-  ls             every model of the store, and those that come with GWRMS; which one serves
-  show MODEL     from what it was learned, how well it was judged, on whom, and whether it can serve here
+  ls             list the models of the store, and those that come with GWRMS; which one serves
+  show MODEL     show what it learned from, how and on whom it was judged, and if it can serve here
   promote MODEL  let it serve every robot, or with --robot one
-  rollback TASK  let that serve again which did before
-  history TASK   what has served, who said so, and why
-  key            this desk's own, with which it signs what it promotes
-  export MODEL   a model as ONNX, for other programs
+  rollback TASK  return to the model that served before
+  history TASK   show what has served, who promoted it, and why
+  key            print this desk's key, which signs what it promotes
+  export MODEL   export a model as ONNX, for other programs
 
-A model's name may be cut off where it is unique. gwrms models COMMAND --help says more.
+A model's name may be abbreviated as long as it is unique. gwrms models COMMAND --help says more.
 """
-PROMOTE_EPILOG: Final = """Servers that run take it within seconds, without a restart. A model that cannot be
-verified is refused, and what serves goes on. `gwrms train --promote` does this where a model is judged
-better. With --instead-of it is refused where meanwhile another one serves than the one that you know of.
+PROMOTE_EPILOG: Final = """Running servers load it within seconds, without a restart. A model that cannot be
+verified is refused, and the present one continues to serve. `gwrms train --promote` does this if a model is
+judged better. With --instead-of it is refused if another model than the named one serves by then.
 
 examples
   gwrms models promote activity-5f0c
   gwrms models promote gait_phase-77aa --robot exo-01 --why "adapted to Ada's walk\""""
-ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first model of a robot's own serves
-that for all robots, and before the first of these what comes with GWRMS."""
-KEY_EPILOG: Final = """Whoever may promote models by which a rule stops robots stands with that line in
-[promoters] of the server's file, on every computer that records these robots."""
+ROLLBACK_EPILOG: Final = """Repeat it to go back further. Before the first model of a robot's own, the one for
+all robots serves; before the first of those, the one that comes with GWRMS."""
+KEY_EPILOG: Final = """Put that line into [promoters] of the server's file, on every computer that records
+these robots, to let a rule stop them by the models that this desk promotes."""
 SHIPPED: Final = f"by default ({UNSIGNED})"
 NOTHING: Final = "nothing"  # that serves
 

@@ -13,7 +13,7 @@ UNKNOWN: Final = "unknown"
 
 
 def told(card: Card, serves: str, problem: str, *, shipped: bool) -> Iterator[str]:
-    """Lines for `gwrms models show`."""
+    """Yield lines for `gwrms models show`."""
     facts = {
         "task": card.task,
         "recipe": card.recipe,

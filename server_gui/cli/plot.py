@@ -34,9 +34,9 @@ FRAME_S: Final = 0.2
 SILENT_S: Final = 1.0  # after which the newest value is none any more
 ROWS: Final = 6  # of a curve
 LABEL: Final = 10  # letters of a scale
-EPILOG: Final = f"""Where there is a display, the window opens on its Signals with these channels ticked, and
-records nothing; else, and with --terminal, they are drawn in the terminal: the last {SPAN_S:g} s, a curve a
-channel, angles in degrees. What is missing is a hole; where nothing comes, the curves go on without it.
+EPILOG: Final = f"""If there is a display, the window opens on its page Signals with these channels ticked,
+and records nothing; otherwise, and with --terminal, they are drawn in the terminal: the last {SPAN_S:g} s,
+one curve per channel, angles in degrees. Missing values are gaps; when no data comes, the curves move on.
 If the output is not a terminal, the curves of --seconds are printed once.
 
 examples

@@ -35,13 +35,13 @@ LOOK_S: Final = 0.25  # a look at what has come waits at most so long
 
 Show = Callable[[Live, Sequence[PredictionNews]], None]
 
-EPILOG: Final = """Live, robots are followed and nothing is recorded; a rule of the server's file says when it
-holds, and stops nothing: only the program that records does (gwrms collect, or a window).
+EPILOG: Final = """Live, robots are followed and nothing is recorded; a rule of the server's file is reported
+when it holds, but stops nothing: only the program that records stops a robot (gwrms collect, or a window).
 
-Over a session, its models of today, or those that --model names, say it again. Where one of them was there
-live, the labels of both are compared: they are the same. Where somebody has labelled the session (gwrms
-label), so is what is right. --rules tells when the rules of the server's file would have begun to hold, and
-how often an hour without cause: look at that before you let a rule stop a robot.
+Over a session, today's models, or those that --model names, predict again. If one of them predicted live,
+both predictions are compared: they are the same. If somebody has labelled the session (gwrms label),
+predictions are compared with the labels. --rules shows when the rules of the server's file would have begun
+to hold, and how often an hour without cause: look at that before you let a rule stop a robot.
 
 examples
   gwrms predict --robot exo-01
@@ -84,7 +84,7 @@ def _settings(arguments: argparse.Namespace) -> ServerSettings:
 
 
 def _addresses(settings: ServerSettings, asked: list[str]) -> dict[str, Address]:
-    """By name in the server's file, else by address."""
+    """Return them by name in the server's file, else by address."""
     names = [_name(settings, text) for text in asked]
     given = {
         name: text.removeprefix(f"{name}=")
@@ -150,7 +150,7 @@ class _Linked:
 
 @contextlib.contextmanager
 def _shown(arguments: argparse.Namespace) -> Iterator[Show]:
-    """How it is shown: as JSON lines, as a picture that is drawn anew, or as lines of what is new."""
+    """Provide the output: JSON lines, a picture that is drawn anew, or lines of what is new."""
     if arguments.json:
         yield _show_json
     elif sys.stdout.isatty():

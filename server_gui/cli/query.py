@@ -30,7 +30,7 @@ _PLAIN: Final = (
 _encoder = msgspec.json.Encoder(decimal_format="number")
 EPILOG = """The tables are telemetry, sessions, resources, events, journal, labels and predictions; their
 columns are in gwrms docs store, and `gwrms query "DESCRIBE telemetry"` shows them. A channel is a
-column; its name has a dot, so write it in double quotes. Name a robot and a time where you can: the rest is
+column; its name has a dot, so write it in double quotes. Name a robot and a time if you can: the rest is
 not read.
 
 examples
@@ -38,7 +38,7 @@ examples
   gwrms query --csv "SELECT utc, \\"left_knee.position\\" FROM telemetry
       WHERE robot = 'exo-01' AND utc >= '2026-11-21 15:00Z'"
 
-Only reading: no other statement, no file outside the store. Times are UTC."""
+Read-only: no other statement, no file outside the store. Times are UTC."""
 
 
 def main(argv: list[str]) -> int:
@@ -85,7 +85,7 @@ def _csv(result: QueryResult) -> None:
 
 
 def _is_plain(kind: pa.DataType) -> bool:
-    """Whether a CSV says it as it is."""
+    """Return whether a CSV shows it as it is."""
     return any(is_kind(kind) for is_kind in _PLAIN)
 
 
@@ -113,7 +113,7 @@ def _list(column: pa.Array) -> list[object]:
 
 
 def _text(value: object) -> str:
-    """For people."""
+    """Return it for people."""
     if value is None:
         return NONE
     if isinstance(value, float):

@@ -39,17 +39,17 @@ from server_gui.core.cloud.selection import Choice, choose
 HEADER: Final = ("SESSION", "ROBOT", "BEGAN (UTC)", "LENGTH", "ROWS", "SIZE", "", "OPERATOR", "NOTES")
 USAGE: Final = """usage: gwrms sessions COMMAND …
 
-  ls                     every recording: robot, when, how long, who recorded it and why
-  show SESSION           what is known of it, its channels, and what happened in it
-  gait SESSION           cadence, step times, symmetry, ranges of motion
+  ls                     list every recording: robot, when, how long, who recorded it and why
+  show SESSION           show its metadata, channels and events
+  gait SESSION           show cadence, step times, symmetry, ranges of motion
   export SESSION --out FILE
-                         as CSV, Parquet or MCAP, whole or a part
-  resources SESSION      what each program on the robot's computer used; memory leaks
-  changed BEFORE AFTER   what changed from one to the other, and what of the walk moved with it
+                         export it as CSV, Parquet or MCAP, whole or a part
+  resources SESSION      show what each program on the robot's computer used, and memory leaks
+  changed BEFORE AFTER   show what changed between them, and what of the walk moved with it
   compare BEFORE[,…] AFTER[,…]
-                         which programs take more than in earlier ones
+                         find programs that use more resources than before
 
-A session's name may be cut off where it is unique. gwrms sessions COMMAND --help says more.
+A session's name may be abbreviated as long as it is unique. gwrms sessions COMMAND --help says more.
 """
 
 

@@ -19,10 +19,10 @@ from server_gui.core.cloud.configuration_changes import (
 from server_gui.core.cloud.metric_changes import moved, walk
 from server_gui.core.evidence.comparison import Evidence, Word
 
-EPILOG = """First what was otherwise when the session AFTER began: wearer, parameters, calibration, firmware,
-EDS files, models, limits, guard, robot.toml, software. What one of them does not tell is in a list of its
-own: not recorded is not unchanged. Then what of the walk moved with it, in the words of gwrms edits: two
-sessions differ in more than anybody has noted, so nothing here says what caused it.
+EPILOG = """First, what differed when the session AFTER began: wearer, parameters, calibration, firmware,
+EDS files, models, limits, guard, robot.toml, software. Facts that one of the sessions lacks are in a list of
+their own: not recorded is not unchanged. Then, what changed in the walk, in the words of gwrms edits: two
+sessions differ in more than anybody has noted, so nothing here names a cause.
 
 example
   gwrms sessions changed 20261119T09 20261121T14

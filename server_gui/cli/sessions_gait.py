@@ -21,8 +21,8 @@ from server_gui.core.processing.gait_measures import LegGait
 from server_gui.core.processing.recording import RecordedGait, summarise
 from server_gui.core.processing.wiring import Wiring
 
-EPILOG = """Means over all strides of which nothing is missing; where events come from, and every formula, is
-in gwrms docs processing. A minute of recording takes a quarter of a second.
+EPILOG = """Means over all complete strides; gwrms docs processing has the sources of events, and every
+formula. A minute of recording takes a quarter of a second.
 
 example
   gwrms sessions gait 20261121T1530 --from 10 --to 70"""

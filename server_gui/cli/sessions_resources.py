@@ -12,9 +12,9 @@ from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, us
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
 
 HEADER = ("PROCESS", "CPU", "MEMORY", "AT MOST", "GROWTH AN HOUR")
-RESOURCES_EPILOG = """A program that had no memory and no CPU in any look, as most threads of the kernel, is
-left out and counted; --all shows it, and --json always has it."""
-COMPARE_EPILOG = """Several sessions a side are separated by commas: with only one, the effect of a version
+RESOURCES_EPILOG = """Programs that never had memory or CPU when looked at, such as most threads of the
+kernel, are left out and counted; --all shows them, and --json always has them."""
+COMPARE_EPILOG = """Separate several sessions on a side by commas: with only one, the effect of a version
 cannot be separated from that of the day. A process is named if its median over the minutes is a tenth more,
 and at least 1 % of a core or 2 MiB, if three quarters of the sessions after lie above three quarters of
 those before, and if chance is ruled out (rank-sum test, p < 0.01 over all comparisons together).

@@ -23,13 +23,13 @@ EPILOG: Final = """keys
   ← →          lower or raise it; the lease is held only while it is written
   q            end
 
-What one may not do on this robot is grey, with the reason below; STOP is for everybody.
-Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says
-how old. q waits until it is known what became of a STOP.
-Where a window on this computer records the robot, and what was learned from its wearer serves or
-is tried, a line says so, and since when.
+Actions that your role does not permit are grey, with the reason below; everybody may STOP.
+Angles are in degrees and lengths in millimetres, as in the window. Old values are grey, with their
+age. q waits for the outcome of a STOP.
+If a window on this computer records the robot, and a model learned from its wearer serves or is
+being tried, a line says so, and since when.
 With danger = true in [prediction] of the server's file, danger is foreseen as in the window.
-Without a terminal: gwrms watch, gwrms describe.
+Without a terminal, use gwrms watch and gwrms describe.
 
 exit status
   0 ended by q or after --seconds; 1 it cannot be shown, or the last STOP is NOT CONFIRMED;
@@ -81,7 +81,7 @@ def _settings() -> "ServerSettings | None":
 
 
 def _foresees(settings: "ServerSettings | None") -> bool:
-    """Whether the server's file wants danger foreseen."""
+    """Return whether the server's file wants danger foreseen."""
     return settings is not None and settings.prediction.enabled and settings.prediction.danger
 
 

@@ -27,22 +27,21 @@ FIGURES: Final = (
     "macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps",
     "covered", "worst_subject_covered", "promised_covered", "promised_wearers",
 )  # fmt: skip
-EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
-hash of their names, or those that --held-out names, are held out to be judged by. A wearer is known by gwrms
-label SESSION --wearer NAME, however that is spelled: P01, p01 and P-1 are one. Where nobody is named each
-session counts as somebody; beside named ones, sessions without a name judge nothing. Sessions of the
-regression set are never learned from, and judge every model.
+EPILOG: Final = """The model learns from every session with labels (gwrms label). A quarter of the wearers,
+chosen by a hash of their names, or those that --held-out names, are held out to judge it. Name a session's
+wearer with gwrms label SESSION --wearer NAME; spelling does not matter: P01, p01 and P-1 are one. If no
+wearer is named, each session counts as a separate wearer; if some are, sessions without a name judge nothing.
+Sessions of the regression set are never learned from, and judge every model.
 
-The model is published (gwrms models ls), and with --promote it serves: where it is better on the held-out
-people than the model that serves now, and nowhere much worse; and where that one still serves at its end.
-Where no model serves robots with these sensors it is not compared, and serves if it knows more than saying
-always the same.
+The model is published (gwrms models ls). With --promote it also serves, if it is better on the held-out
+people than the model that serves now, nowhere much worse, and if that model still serves when training ends.
+If no model serves robots with these sensors, it serves if it is better than a constant prediction.
 gwrms models rollback takes that back.
 
 examples
   gwrms train activity
   gwrms train activity --held-out P03 --held-out P07 --promote
-  gwrms train activity --pseudo-labels 0.95       # also from what the serving model is so sure of
+  gwrms train activity --pseudo-labels 0.95       # also from sure predictions of the serving model
   gwrms train gait_phase --robot exo-01 --session 20261121T1530 --adapt-from gait_phase-0123456789ab --promote
   gwrms train falling --cluster tcp://192.0.2.9:8786
 
@@ -116,7 +115,7 @@ class _Stages:
 def _promoted(
     registry: Registry, model: str, trained: "Trained", arguments: argparse.Namespace
 ) -> tuple[bool, str]:
-    """Whether it serves now; why not, where it was better but something else serves since it was judged."""
+    """Promote it if it may serve. Return whether it serves now; else why another model still does."""
     if not (arguments.promote and trained.decision.may_serve):
         return False, ""
     who, why = user_name(), "; ".join(trained.decision.why)

@@ -11,7 +11,7 @@ from ml.store.private import opener
 
 @contextlib.contextmanager
 def draft(file: Path) -> Iterator[Path]:
-    """Another name to write to within the block; it becomes `file` where that ends well, else it goes.
+    """Give another name to write to within the block; it becomes `file` if that ends well, else it goes.
 
     It is its owner's alone.
     """

@@ -136,7 +136,7 @@ class Child:
         self._err.close()
 
     def _listen(self) -> int | None:
-        """Its exit status, None while it lives; whatever it wrote until then is held."""
+        """Return its exit status, None while it lives; whatever it wrote until then is held."""
         ended = self._process.poll()
         self._out.drain()
         self._err.drain()

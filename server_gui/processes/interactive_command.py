@@ -104,7 +104,7 @@ class InteractiveCommand:
             self._wake = -1
 
     def _serve(self, process: "subprocess.Popen[bytes]") -> None:
-        """Until it has ended and said all; then its pipes are closed, whoever else holds them."""
+        """Serve it until it has ended and said all; then close its pipes, whoever else holds them."""
         if process.stdin is None or process.stdout is None or process.stderr is None:
             return
         os.set_blocking(process.stdin.fileno(), False)

@@ -14,7 +14,7 @@ def can_interfaces(network: Path = NETWORK) -> list[str]:
 
 
 def serial_ports(folder: Path = SERIAL) -> list[str]:
-    """Those that keep their name wherever they are plugged in."""
+    """Return those that keep their name wherever they are plugged in."""
     return sorted(map(str, folder.glob("*")))
 
 

@@ -28,7 +28,7 @@ def simulated_robot(
     give_up: Callable[[], None],
     ready: Callable[[RobotPart], None] = lambda _: None,
 ) -> Iterator[tuple[Address, Callable[[], None]]]:
-    """Where its gateway listens, and how to check that all is well; `give_up` may raise while it starts.
+    """Provide its gateway's address, and a check that all is well; `give_up` may raise while it starts.
 
     `ready` hears of each part as soon as it is.
 

@@ -138,7 +138,7 @@ def _in_terminal(own: DemoRobot, options: Options, check: Callable[[], None]) ->
 
 
 def _started(own: DemoRobot, steps: FirstSteps, check: Callable[[], None]) -> Address:
-    """Where the gateway listens, once it does."""
+    """Return the gateway's address, once it listens."""
     while True:
         check()
         own.check()

@@ -68,7 +68,7 @@ class KeyParser:
 
 
 def _length(held: bytes) -> int | None:
-    """Bytes of the sequence at the start, None while it is incomplete."""
+    """Return bytes of the sequence at the start, None while it is incomplete."""
     if held[:1] != b"\x1b":
         return 1
     if len(held) < 2:

@@ -52,7 +52,7 @@ def told(name: str, watched: Watched) -> str:
 
 
 def link(watched: Watched) -> str:
-    """How a robot is reached, and how much comes from it."""
+    """Return how a robot is reached, and how much comes from it."""
     link = watched.robot.link
     if link.state is ConnectionState.CONNECTED:
         age_s = watched.robot.age_s()
@@ -78,7 +78,7 @@ def _model(shown: NewestPrediction) -> tuple[str, ...]:
 
 
 def _right(found: Iterable[NewestPrediction]) -> Iterator[str]:
-    """How right models were of late, where labels say what was so."""
+    """Yield how right models were of late, by labels."""
     for shown in found:
         if (quality := shown.predicted.quality) is not None:
             yield f"{shown.predicted.prediction.task}: {quality.text} in {WITHIN_DAYS} days"

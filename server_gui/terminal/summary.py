@@ -77,7 +77,7 @@ class Summary:
         self.worst[component] = max(self.worst.get(component, state), state, key=_severity)
 
     def failures(self) -> list[str]:
-        """Why the run was no walk that can be believed, in words; empty when it was one."""
+        """Return why the run was no walk that can be believed, in words; empty if it was one."""
         still = [name for name, seen in self.joints.items() if seen.span < MOVED_RAD]
         lost = [name for name, state in self.worst.items() if state == "lost"]
         return [

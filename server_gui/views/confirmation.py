@@ -51,7 +51,7 @@ class Question(QDialog):
         (field or self.cancel).setFocus()
 
     def add(self, field: QLineEdit) -> None:
-        """Another field, above the buttons."""
+        """Add another field, above the buttons."""
         self._column.insertWidget(self._column.count() - 1, field)
         QWidget.setTabOrder(self.field or self.words, field)
 

@@ -32,7 +32,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationSta
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 OLD: Final = "old"  # what a model said is no prediction any more
-NOT_JUDGED: Final = "Not judged while stopped"
+NOT_JUDGED: Final = "Not judged"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 UNSEEN: Final = "not judged"  # for the model does not see all
@@ -89,8 +89,8 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     if prediction.label == UNKNOWN:
         return PredictionRow(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
     shape = ("square", "bad") if falls else ("diamond", "accent")
-    text = f"{word} {100 * prediction.probability:.0f} %"
-    is_doubtful = worth.worth is Worth.DOUBTFUL
+    is_doubtful = worth.worth is Worth.DOUBTFUL  # then a percentage would look sure
+    text = f"{word}?" if is_doubtful else f"{word} {100 * prediction.probability:.0f} %"
     return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
 
 
@@ -147,8 +147,6 @@ def doing(station: Station) -> tuple[str, ...]:
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
-    if line.is_doubtful:  # a percentage would look sure
-        line = replace(line, text=f"{PROBABLE.sub('', line.text)}?")
     short = line.short_text
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
     least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
@@ -187,7 +185,7 @@ def lines(station: Station) -> Iterator[PredictionRow]:
 
 
 def _learning(adapting: Adapting) -> PredictionRow:
-    """How it goes with what is learned from the wearer, while there is nothing to decide."""
+    """Return the progress of learning from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
         AdaptationState.UNNAMED: ("Wearer not named", adapting.text),
@@ -281,9 +279,10 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
     if not differences:
         return replace(line, text="by the model alone")
     if max(differences) <= AGREES:
-        return replace(line, text="steps and model agree", brief="both agree")
+        return replace(line, text="steps and model agree", brief="model agrees")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
+    apart_by = f"{max(differences):.0f} % apart"
+    return replace(line, mark=mark, text=f"steps and model {apart_by}", brief=apart_by)
 
 
 def _knows(shown: Told) -> bool:
@@ -293,7 +292,7 @@ def _knows(shown: Told) -> bool:
 
 
 def _as_predicted(line: PredictionRow) -> PredictionRow:
-    """As it is said where other things stand beside it; what is old is no prediction."""
+    """Return it as it is said where other things stand beside it; what is old is no prediction."""
     if line.mark.word == OLD:
         return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))

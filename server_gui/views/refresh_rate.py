@@ -17,7 +17,7 @@ class RefreshRate:
         self._about: object = None
 
     def is_due(self, about: object) -> bool:
-        """Whether it is time; `about` is what it would be about."""
+        """Return whether it is time; `about` is what it would be about."""
         self._frame += 1
         late = now_ns() - self._read_ns >= READ_NS
         due = self._frame % SLOW == 0 or late or about != self._about

@@ -31,9 +31,10 @@ from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.faulty import CAUSE, fault, settle
 from tests.gui.foreseen import predicted
+from tests.gui.running import wait
 from tests.support.desk import JOINTS, looked, telemetry, walking
 
-WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
+WHY = "nothing was sent; 127.0.0.1:7420 did not answer hello within 5 s"
 
 
 def question(window: MainWindow) -> Question:
@@ -412,15 +413,15 @@ def test_alarms_of_two_robots_are_named(around: Around, bench: Bench) -> None:
 
 def test_words_have_room_beside_the_buttons_that_come_with_them(window: MainWindow, bench: Bench) -> None:
     bench.look_again([walking(10), looked()])
+    bar = window.alarms._words.verticalScrollBar()
     for width in (1200, 1480):
         window.resize(width, 900)
         bench.station.stopping.held = False
         bench.draw(window)
         bench.station.stopping.held = True
         window.refresh()
-        QApplication.processEvents()
         assert window.alarms.told
-        assert not window.alarms._words.verticalScrollBar().isVisible()
+        wait(lambda: not bar.isVisible(), "laid the words out without a scroll bar")
 
 
 def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad(

@@ -4,11 +4,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.news import NewsKind
 from server_gui.views.frame.main_window import MainWindow
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import CAUSE, fault
-from tests.support.desk import walking
+from tests.support.desk import looked, walking
 
 
 def test_an_event_leads_to_its_instant_in_the_signals_that_are_shown(
@@ -48,6 +50,17 @@ def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
     bench.draw(around)
     assert around.events.lines == around.events.pinned
     assert f"left knee: {CAUSE}" in [line.text for line in around.events.lines]
+
+
+def test_the_worst_alarm_is_the_first_event_also_if_it_is_the_recording_s(
+    around: Around, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.station.take([walking(100), looked(state="stale", problem="nothing for 2 s")])
+    bad = Alarm(Kind.NOT_RECORDED, "", "the disk of the spool is full")
+    monkeypatch.setattr(bench.desk.recording, "_found", lambda: iter([bad]))
+    bench.draw(around)
+    colours = [line.mark.colour for line in around.events.pinned]
+    assert (around.events.pinned[0].robot, colours[:2]) == ("recording", ["bad", "warn"])
 
 
 def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> None:

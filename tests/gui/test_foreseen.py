@@ -157,7 +157,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
     station.take_prediction(predicted("walk", {"walk": 1.0}, trust=drifted))
     window.header.refresh()
     words = window.header._chips["status"]._words
-    assert (words.main, words.parts) == ("Walk 100 %", ("doubtful", "predicted"))
+    assert (words.main, words.parts) == ("Walk?", ("doubtful", "predicted"))
     assert all("%" not in wording for wording in doing(station))
     assert doing(station)[0].startswith("Walk? 120 steps/min · ")
     station.take_prediction(predicted("walk", {"walk": 1.0}))
@@ -187,7 +187,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
         station.take([telemetry([now_ns], columns, now_ns)])
     line = status(station)
     assert line is not None
-    assert (line.text, line.mark.colour, line.detail) == ("Not judged while stopped", "dim", why)
+    assert (line.text, line.mark.colour, line.detail) == ("Not judged", "dim", why)
     window.overview.refresh()
     ring = window.overview._ring
     assert (ring._word, ring._below) == ("Stopped", "not judged")
@@ -196,7 +196,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     station.take_prediction(predicted("stride", {"stride": 1.0}, "gait_phase"))
     judged = [one for one in lines(station) if one.text.startswith(("Balance", "Stride"))]
     words = [(one.text, one.mark.colour, one.detail) for one in judged]
-    assert words == [("Balance: Not judged while stopped", "dim", why)], "a prediction is shown as current"
+    assert words == [("Balance: Not judged", "dim", why)], "a prediction is shown as current"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None

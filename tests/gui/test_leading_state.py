@@ -30,7 +30,7 @@ def test_after_a_reset_how_to_go_on_is_said_with_a_warning_that_is_not_its_cause
     assert around.alarms._icon.mark == bench.station.mark
     said = around.alarms.accessibleDescription()
     assert said.startswith(
-        "stop reset: enable the drives to go on · also component stale: left knee: late; since "
+        "stop reset: nothing moves until the drives are enabled · also component stale: left knee: late; "
     )
     assert "to go on: enable the drives" in said
 

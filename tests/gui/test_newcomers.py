@@ -85,7 +85,7 @@ def test_what_is_old_looks_old_and_is_not_called_now(theme: Theme, bench: Bench)
 def test_a_robot_that_is_linked_again_is_not_said_to_have_no_link_now(bench: Bench) -> None:
     bench.station.take([walking(100), looked()])
     bench.station.stop("STOP button of the window")
-    bench.first.fail(NotConnected(f"there is no link to it now; {MANY}"))
+    bench.first.fail(NotConnected(f"nothing was sent; {MANY}"))
     bench.look_again([walking(100), looked()])
     (alarm,) = (one.alarm for one in bench.station.alarms.active if "STOP" in one.alarm.mark.word)
     assert alarm.line.endswith("STOP again; the STOP before failed: there was no link")

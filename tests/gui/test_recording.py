@@ -191,7 +191,7 @@ def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> N
         keeper.answer = answer
         recording._asked_ns = None
         recording.look()
-    assert [item.text for item in news.items] == [f"over: {FULL.text}", FULL.text]
+    assert [item.text for item in news.items] == [f"no longer: {FULL.text}", FULL.text]
     assert recording.said(ADDRESS).tone is Tone.GOOD
 
 

@@ -65,6 +65,7 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one
     assert player.beside_bar.isVisible()
     assert player.beside_bar.said.text().endswith("aligned by")
     assert player.beside_bar.by.currentText() == "their beginnings"
+    assert scene.beside_text().endswith("played together"), "aligned as is chosen above, and in no second way"
     assert rules.out_of_reach(player) == []
     player.beside_bar.close_button.click()
     shown.draw()

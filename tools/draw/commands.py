@@ -42,9 +42,9 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
 ALONE: Final = frozenset({"edits", "sensor", "sim"})  # which are commands without such a word too
 _HEAD: Final = """# Commands
 
-`gwrms COMMAND --help` says what stands here. Those that ask a robot take `--robot HOST:PORT`
-(127.0.0.1:7420) and `--json`; those that ask the store take `--config` and `--json`. Exit status: 0 done,
-1 it failed, 2 wrong usage, unless a command says more. Errors are a sentence or two on stderr; `--debug`
+`gwrms COMMAND --help` shows the same text. Commands that query a robot take `--robot HOST:PORT`
+(127.0.0.1:7420) and `--json`; those that query the store take `--config` and `--json`. Exit status: 0 done,
+1 failed, 2 wrong usage, unless a command says more. Errors are a sentence or two on stderr; `--debug`
 anywhere shows tracebacks.
 """
 
@@ -66,7 +66,7 @@ class Command:
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     found = list(commands())
     overview = ["| command | |", "|---|---|"]
     overview += [
@@ -76,7 +76,7 @@ def draw() -> str:
 
 
 def commands() -> Iterator[Command]:
-    """Every command that has arguments of its own, in the order of `gwrms --help`."""
+    """Yield every command that has arguments of its own, in the order of `gwrms --help`."""
     for name in main.COMMANDS:
         words = WORDS.get(name, ())
         if not words or name in ALONE:
@@ -86,7 +86,7 @@ def commands() -> Iterator[Command]:
 
 
 def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
-    """What reads the arguments of a command; found by running it up to there."""
+    """Return the parser of a command's arguments; found by running it up to there."""
 
     def capture(parser: argparse.ArgumentParser, *_arguments: object, **_named: object) -> None:
         raise _Captured(parser)

@@ -51,7 +51,7 @@ def kind(type_: Any) -> str:
 
 
 def without_none(type_: Any) -> Any:
-    """The type of a value that is given: `None` only stands for its absence."""
+    """Return the type of a value that is given: `None` only stands for its absence."""
     if typing.get_origin(type_) is Annotated:
         inner, *notes = typing.get_args(type_)
         return Annotated[without_none(inner), *notes]
@@ -62,7 +62,7 @@ def without_none(type_: Any) -> Any:
 
 
 def parts(type_: Any) -> Iterator[Any]:
-    """The type itself, and all that it is made of."""
+    """Yield the type itself, and all that it is made of."""
     yield type_
     for argument in typing.get_args(type_):
         yield from parts(argument)

@@ -22,20 +22,20 @@ from tools.draw.commands import ALONE, WORDS, commands, parser_of
 
 
 def help_pages() -> str:
-    """Every command's help as data; `gateway/missing_extras.py` makes parsers of it again."""
+    """Return every command's help as data; `gateway/missing_extras.py` makes parsers of it again."""
     pages = {" ".join(one.words): _page(one.parser) for one in commands()}
     pages |= {name: Page(text=_said(name)) for name in WORDS if name not in pages}
     return msgspec.json.format(msgspec.json.encode(dict(sorted(pages.items()))), indent=1).decode() + "\n"
 
 
 def completion(shell: str) -> str:
-    """What completes the command line in this shell."""
+    """Return the script that completes the command line in this shell."""
     found: str = shtab.complete(_tree(), shell=shell)
     return found
 
 
 def man() -> str:
-    """The manual's page, with every command."""
+    """Return the manual's page, with every command."""
     lines = [
         ".TH GWRMS 1",
         ".SH NAME",

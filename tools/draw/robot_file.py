@@ -89,7 +89,7 @@ _FORMATS: Final[Mapping[str, Collection[str]]] = {  # found by their folders
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     return "\n\n".join([_HEAD, *_sections()]) + "\n"
 
 

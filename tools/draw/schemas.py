@@ -17,5 +17,5 @@ SCHEMAS: Final[Mapping[str, Callable[[], Schema]]] = {
 
 
 def draw(kind: str) -> str:
-    """The file."""
+    """Return the file."""
     return json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n"

@@ -40,18 +40,20 @@ recorded, too.""",
     (
         "`[[rules]]`",
         RuleSettings,
-        "There are no rules by default. Test a rule on recordings before it may stop a robot.",
+        """There are no rules by default. `"stop"` stops the robot only if one of `[promoters]` promoted the
+serving model; otherwise the event says *NOT STOPPED*, with the reason. The calibration of `danger` cannot be
+promoted, so a rule on it never stops a robot. Test a rule on recordings before it may stop a robot.""",
     ),
 )
 _PROMOTERS: Final = """## `[promoters]`
 
-Desks whose promoted models may stop a robot by a rule: NAME = "SHA-256", the line printed by
-`gwrms models key` on that desk. Without it, no rule stops a robot
-([promoters](models.md#who-promoted-it))."""
+Desks whose promoted models may stop a robot by a rule with `action = "stop"`: NAME = "SHA-256", the line
+printed by `gwrms models key` on that desk. Without this table no rule stops a robot, and all of them still
+raise alarms ([promoters](models.md#who-promoted-it))."""
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     return "\n\n".join([_HEAD, *_sections(), _PROMOTERS]) + "\n"
 
 

@@ -26,7 +26,7 @@ class Key:
 
 
 def written(struct: type[Struct]) -> Iterator[Key]:
-    """The keys of a table that people write: what may be `None` may be left out."""
+    """Yield the keys of a table that people write: what may be `None` may be left out."""
     said = comments(struct)
     for field in fields(struct):
         meaning = said.get(field.name, "").replace("None: ", "not given: ")
@@ -34,7 +34,7 @@ def written(struct: type[Struct]) -> Iterator[Key]:
 
 
 def sent(struct: type[Struct]) -> Iterator[Key]:
-    """The fields of an object that programs send: what may be `None` is `null`."""
+    """Yield the fields of an object that programs send: what may be `None` is `null`."""
     said = comments(struct)
     for field in fields(struct):
         meaning = said.get(field.name, "").replace("None: ", "null: ")
@@ -42,7 +42,7 @@ def sent(struct: type[Struct]) -> Iterator[Key]:
 
 
 def docstring(struct: type[Struct]) -> str:
-    """What is said of it, a line a paragraph, without the name that stands above it already."""
+    """Return its docstring, a line a paragraph, without the name that already stands above it."""
     paragraphs = (inspect.getdoc(struct) or "").split("\n\n")
     text = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     text = _ABOVE.sub("", text).replace("`None`", "`null`")
@@ -50,7 +50,7 @@ def docstring(struct: type[Struct]) -> str:
 
 
 def mentioned(struct: type[Struct]) -> Iterator[type[Struct]]:
-    """The structs that its fields are made of, and theirs."""
+    """Yield the structs that its fields are made of, and theirs."""
     for field in fields(struct):
         for part in parts(field.type):
             if isinstance(part, type) and issubclass(part, Struct):

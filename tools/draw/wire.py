@@ -42,7 +42,7 @@ An error has a message for people, which says what to do, and `data` with its ki
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     declared = list(METHODS.values())
     parts = [_HEAD, "## Methods", _overview(declared), *map(_section, declared)]
     parts += [_STREAM, _fields(StreamData), _ERRORS, _kinds(), _fields(ErrorData), "## Objects"]
@@ -92,7 +92,7 @@ def _kinds() -> str:
 
 
 def _objects(declared: list[AnyMethod]) -> Iterator[str]:
-    """The structs that results are made of, by their names."""
+    """Yield the structs that results are made of, by their names."""
     found: Mapping[str, type[Struct]] = {
         part.__name__: part
         for one in declared

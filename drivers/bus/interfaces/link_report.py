@@ -16,7 +16,7 @@ def missing_link(name: str) -> str:
 
 
 def blocking_problem(name: str, link: NetworkInterface, bitrate: int | None) -> str | None:
-    """Why no frame can pass at all; `None` when frames can."""
+    """Return why no frame can pass at all; `None` when frames can."""
     if not link.up:
         return f"{name} is down; run: {_up_line(name, link, bitrate)}"
     return None

@@ -67,7 +67,7 @@ _OWN: dict[str, Callable[[CanSettings], Transport]] = {
 
 
 def needs_python_can(settings: CanSettings) -> bool:
-    """Whether the interface is opened by python-can, and not by a transport of ours."""
+    """Return whether python-can opens the interface, and not a transport of ours."""
     return settings.interface not in _OWN or (settings.interface == "socketcan" and bool(settings.more))
 
 
@@ -77,7 +77,7 @@ def open_transport(settings: CanSettings) -> Transport:
 
 
 def obstacle(settings: CanSettings) -> str | None:
-    """Why the interface could not be opened, or not as `settings` say; it is only looked at."""
+    """Return why the interface could not be opened, or not as `settings` say; it is only looked at."""
     if settings.interface == "socketcan":
         from drivers.bus.interfaces.socketcan import obstacle as socketcan_obstacle
 
@@ -107,12 +107,12 @@ def _daemon_obstacle(settings: CanSettings) -> str | None:
 
 
 def interfaces() -> tuple[str, ...]:
-    """Every name of an interface that comes with us."""
+    """Return every name of an interface that comes with us."""
     return (*sorted(_OWN), *_PYTHON_CAN)
 
 
 def is_interface(name: str) -> bool:
-    """Whether there is such an interface: one that comes with us, or of a plug-in of python-can."""
+    """Return whether there is such an interface: one that comes with us, or of a plug-in of python-can."""
     if name in interfaces():
         return True
     from importlib.metadata import entry_points  # for who has a plug-in, or has mistyped, only

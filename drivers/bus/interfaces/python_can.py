@@ -109,7 +109,7 @@ class PythonCanTransport:
 
 
 def _is_possible(message: can.Message) -> bool:
-    """Whether it is a classic frame whose parts fit together: a damaged line can say anything."""
+    """Return whether it is a classic frame whose parts fit together: a damaged line can say anything."""
     if message.is_error_frame:
         return True
     highest = 0x1FFF_FFFF if message.is_extended_id else 0x7FF

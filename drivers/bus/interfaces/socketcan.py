@@ -91,7 +91,7 @@ class SocketCanTransport:
             time.sleep(QUEUE_LOOK_S)
 
     def carried(self) -> tuple[int, int] | None:
-        """As the kernel counts for the interface, whatever its filters keep from us."""
+        """Return it as the kernel counts for the interface, whatever its filters keep from us."""
         if self._statistics is None:
             return None
         try:
@@ -151,7 +151,7 @@ def open_socketcan(settings: CanSettings) -> SocketCanTransport:
 
 
 def obstacle(settings: CanSettings) -> str | None:
-    """Why no frame would pass, or what is otherwise than in `settings`; the interface is only looked at."""
+    """Return why no frame would pass, or what differs from `settings`; only look at the interface."""
     name = str(settings.channel)
     try:
         link = read_link(name)

@@ -82,7 +82,7 @@ def _remote_frame(identifier: str, stamp_ns: int) -> Frame | None:
 
 
 def waited_stamps(messages: Sequence[str], since_ns: int, now_ns: int) -> list[int]:
-    """When each frame came, of which the last came now and the others before, as the server's stamps tell.
+    """Return when frames came, by the server's stamps; the last one came now, the others before.
 
     None came before `since_ns`, for until then all was read: so a server's clock that steps does no harm.
     """
@@ -154,7 +154,7 @@ class SocketcandTransport:
         self._room.register(self._out, select.POLLOUT)
 
     def receive(self, timeout_s: float) -> Sequence[Frame]:
-        """Frames that came, stamped when they were read; those that waited by `waited_stamps`."""
+        """Return frames that came, stamped when they were read; those that waited by `waited_stamps`."""
         messages = self._early or self._read(timeout_s)
         self._early = []
         since_ns, self._read_ns = self._read_ns, time.monotonic_ns()

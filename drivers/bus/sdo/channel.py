@@ -103,7 +103,7 @@ class SdoChannel:
         return self._written.known((index, subindex), otherwise)
 
     def is_unsure(self, index: int, subindex: int) -> bool:
-        """Whether it was written, and nobody knows whether the device took it."""
+        """Return whether it was written, and nobody knows whether the device took it."""
         return self._written.is_unsure((index, subindex))
 
     # What comes, and who is first.
@@ -300,11 +300,11 @@ class SdoChannel:
         return transfer.late_answer
 
     def _is_ambiguous(self, transfer: Transfer[Any]) -> bool:
-        """Whether its answer could be one to an earlier request."""
+        """Return whether its answer could be one to an earlier request."""
         return self._outstanding.holds(transfer.about) and transfer.late_answer is None
 
     def _read_another(self, transfer: Transfer[Any], deadline: float, needed: Callable[[], bool]) -> None:
-        """Until it is answered, or no longer needed."""
+        """Read another object until it is answered, or no longer needed."""
         index, subindex = self._outstanding.probe(transfer.about)
         probe = read(self.label, index, subindex, transfer.timeout_s)
         request = self._hand_over(probe, next(probe.begin()))
@@ -354,7 +354,7 @@ class SdoChannel:
     def _offer(
         self, transfer: Transfer[Any], frame: bytes, *, begins: bool
     ) -> tuple[Request, Callable[[], bool]]:
-        """Where it has to wait for its turn, it is asked again then whether it may go."""
+        """Offer a frame to the bus; if it has to wait for its turn, it is asked again whether it may go."""
 
         def wanted() -> bool:
             return not self._interrupted.is_set() and not self._objection(transfer)

@@ -63,7 +63,7 @@ class Outstanding:
                 self._requests.remove(request)
 
     def holds(self, about: bytes) -> bool:
-        """Whether an answer about this object may still come."""
+        """Return whether an answer about this object may still come."""
         if not self._requests and self._late is None and not self._crowd:
             return False  # as a rule
         with self._lock:
@@ -71,7 +71,7 @@ class Outstanding:
             return asked or about in self._crowd or (self._late is not None and self._late[1:4] == about)
 
     def is_lost(self, answer: bytes) -> bool:
-        """Whether this may answer a request so old that nobody knows any more which."""
+        """Return whether this may answer a request so old that nobody knows any more which."""
         with self._lock:
             return protocol.names_object(answer) and answer[1:4] in self._crowd
 
@@ -99,7 +99,7 @@ class Outstanding:
             self._late = None
 
     def probe(self, avoid: bytes) -> tuple[int, int]:
-        """Another object than `avoid` to ask for, so that its answer settles what was asked before.
+        """Return another object than `avoid` to ask for, so that its answer settles what was asked before.
 
         One that is not asked for already, because its answer settles everything. A node that stays silent is
         asked for the same ones again: such objects are left for when it is heard.
@@ -126,7 +126,7 @@ class Outstanding:
         return None
 
     def _answer_repeated(self, settled: Request, answer: bytes) -> None:
-        """Where the same was written again, and nothing else in between, each is known by this."""
+        """Answer all repetitions of one write by this, if nothing else was written in between."""
         later = [one for one in self._requests if one.about == settled.about]
         if protocol.is_expedited_download(settled.frame) and all(one.frame == settled.frame for one in later):
             for one in later:

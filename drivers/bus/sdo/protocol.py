@@ -51,17 +51,17 @@ class SdoProtocolError(Exception):
 
 
 def multiplexer(index: int, subindex: int) -> bytes:
-    """How frames name an object: bytes 1 to 3 of those that do."""
+    """Return an object's name in frames: bytes 1 to 3 of those that name one."""
     return index.to_bytes(2, "little") + bytes([subindex])
 
 
 def names_object(response: bytes) -> bool:
-    """Whether a response says which object it is about; those of segments do not."""
+    """Return whether a response says which object it is about; those of segments do not."""
     return response[0] == ABORT or response[0] & SPECIFIER in (_UPLOADED, _DOWNLOADED)
 
 
 def answers(response: bytes, request: bytes, about: bytes) -> bool:
-    """Whether a response can be the one to a request about this object; `about` is its multiplexer."""
+    """Return whether a response can answer a request about this object; `about` is its multiplexer."""
     if response[0] == ABORT:
         return response[1:4] == about
     specifier = _ANSWERS[request[0] & SPECIFIER]
@@ -71,7 +71,7 @@ def answers(response: bytes, request: bytes, about: bytes) -> bool:
 
 
 def concludes(response: bytes, request: bytes) -> bool:
-    """Whether a response ends the upload that this request began: with data, or refused."""
+    """Return whether a response ends the upload that this request began: with data, or refused."""
     ends = response[0] == ABORT or response[0] & (SPECIFIER | 0x02) == _UPLOADED | 0x02
     return ends and request[0] & SPECIFIER == _UPLOAD
 
@@ -84,7 +84,7 @@ def confirmed_write(response: bytes) -> tuple[int, int] | None:
 
 
 def is_expedited_download(request: bytes) -> bool:
-    """Whether a request is a write that needs no other."""
+    """Return whether a request is a write that needs no other."""
     return request[0] & (SPECIFIER | 0x02) == _DOWNLOAD | 0x02
 
 

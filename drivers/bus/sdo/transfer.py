@@ -69,6 +69,6 @@ def write(
 
 
 def value_text(data: bytes) -> str:
-    """Bytes as a number where they can be one: `5000 (88 13)`."""
+    """Return bytes as a number where they can be one: `5000 (88 13)`."""
     number = f"{int.from_bytes(data, 'little')} " if len(data) in (1, 2, 4, 8) else ""
     return f"{number}({data[:16].hex(' ')}{' …' if len(data) > 16 else ''})"

@@ -210,5 +210,5 @@ class SdoWorker:
 
 
 def _begin(future: Future[Any]) -> bool:
-    """Whether its job is still wanted; one that was interrupted has begun already."""
+    """Return whether its job is still wanted; one that was interrupted has begun already."""
     return future.running() or future.set_running_or_notify_cancel()

@@ -133,7 +133,7 @@ class VectornavParser(FrameScanner[ImuFrame]):
 
 
 def _ascii_length(buffer: bytearray, start: int) -> int:
-    """Up to the checksum's last digit; the byte behind it tells whether it has two or four."""
+    """Return the length up to the checksum's last digit; the byte behind tells if it has two or four."""
     so_far = len(buffer) - start
     star = buffer.find(b"*", start, start + LONGEST_ASCII)
     body = buffer[start + 1 : star if star >= 0 else start + LONGEST_ASCII]

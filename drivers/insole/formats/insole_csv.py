@@ -116,7 +116,7 @@ class InsoleCsvParser(DelimitedParser[InsoleFrame]):
 
 
 def find_columns(description: CsvDescription, header: tuple[str, ...] | list[str]) -> Columns | None:
-    """Where everything is in lines under `header`; `None` where it does not name the cells."""
+    """Return the columns of lines under `header`; `None` if it does not name the cells."""
     places = {name: place for place, name in enumerate(header)}
 
     def find(column: Column | None, common: tuple[str, ...] = ()) -> int | None:

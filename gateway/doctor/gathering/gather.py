@@ -147,7 +147,7 @@ def _check_robot(config: RobotConfig, described: Robots, how: How) -> None:
 
 
 def _other_file(config: RobotConfig, described: Robots) -> str | None:
-    """Why what the gateway tells is not judged by this file; gateways of before do not say."""
+    """Return why this file does not judge what the gateway tells; older gateways do not say."""
     if described.file in (None, config.digest):
         return None
     return f"it read {described.file[:8] if described.file else '–'}…, this file is {config.digest[:8]}…"

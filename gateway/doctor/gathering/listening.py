@@ -50,7 +50,7 @@ class Listening:
         return {name: ear.facts(asked_by_us.get(name, {})) for name, ear in self._ears.items()}
 
     def asked(self, bus: str) -> frozenset[int]:
-        """Nodes that somebody asks by SDO."""
+        """Return nodes that somebody asks by SDO."""
         return self._ears[bus].traffic.asked()
 
     def _await_open(self) -> None:
@@ -71,7 +71,7 @@ class _Ear:
             self.bus.subscribe(can_id, self._taking(can_id))
 
     def begin(self) -> None:
-        """From now on it counts."""
+        """Count from now on."""
         self._began_ns = time.monotonic_ns()
         self._errors, self._frames = self.bus.health.error_frames, self.bus.frames
 

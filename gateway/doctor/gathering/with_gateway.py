@@ -28,7 +28,7 @@ def transfers(buses: Buses) -> dict[str, dict[int, int]]:
 
 
 def begun_between(before: Buses, after: Buses) -> dict[str, dict[int, int]]:
-    """Those that it began meanwhile."""
+    """Return those that it began meanwhile."""
     old = transfers(before)
     return {
         bus: {node: count - old.get(bus, {}).get(node, 0) for node, count in nodes.items()}
@@ -60,7 +60,7 @@ def _state(words: str) -> BusState:
 
 
 def samples(robot: Robot, described: Robots, seconds: float) -> Samples:
-    """So many seconds of what motion is judged by; a second or two before that are left out."""
+    """Take so many seconds of what motion is judged by; a second or two before are left out."""
     names = [one.name for one in described.channels if one.quantity in CHANNELS]
     if not names:
         return Samples(why_none="the robot has no joint, insole or IMU that could be sampled")

@@ -40,7 +40,7 @@ def harmless(config: RobotConfig) -> RobotConfig:
 
 
 def samples(config: RobotConfig, seconds: float, wait: Wait, *, active: bool) -> Samples:
-    """So many seconds of sensors and, where `active`, of joints."""
+    """Take so many seconds of sensors and, if `active`, of joints."""
     robot = assemble(harmless(config))
     chosen = [one for one in robot.components.values() if active or _only_listens(config, one)]
     if not chosen:

@@ -56,7 +56,7 @@ def _buses(seen: Observations) -> Iterator[Verdict]:
 
 
 def _strangers(seen: Observations) -> Iterator[Verdict]:
-    """Nodes that no table has: a master's, perhaps, or a drive with another id than it should have."""
+    """Yield nodes that no table has: a master's, perhaps, or a drive with another id than it should have."""
     for bus, settings in seen.config.can.items():
         known = {place.table.node_id for place in seen.nodes() if place.table.bus == bus}
         known |= {

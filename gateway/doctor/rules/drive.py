@@ -101,7 +101,7 @@ def _per_count(table: JointSettings, unit: str) -> float:
 
 
 def _speeds_ratio(position: list[float], velocity: list[float], period_s: float) -> float | None:
-    """By which the velocity has to be multiplied to be the position's; `None` where one of them stands.
+    """Return the factor from the velocity to the position's speed; `None` if one of them stands.
 
     Their sizes are compared, not their courses: a velocity that is only polled now and then is late.
     """
@@ -213,7 +213,7 @@ def reaction(seen: Observations) -> Iterator[Verdict]:
 
 
 def _rad_per_count(seen: Observations, place: Place) -> float:
-    """At the joint: by what the drive knows of encoder and gear, else by the file."""
+    """Return it at the joint: by what the drive knows of encoder and gear, else by the file."""
     table = place.table
     if not isinstance(table, JointSettings):
         return 1.0

@@ -52,7 +52,7 @@ class Pair:
 
 
 def _pairs(seen: Observations) -> Iterator[Pair | str]:
-    """Each joint that both legs have; a reason in words where it cannot be judged."""
+    """Yield each joint that both legs have; a reason in words where it cannot be judged."""
     for kind in NORMAL:
         names = [joint_of(side, kind) for side in SIDES]
         if any(name not in seen.config.joint for name in names):
@@ -65,7 +65,7 @@ def _pairs(seen: Observations) -> Iterator[Pair | str]:
 
 
 def _single(seen: Observations) -> Iterator[Place]:
-    """Joints that no name pairs with one of the other leg."""
+    """Yield joints that no name pairs with one of the other leg."""
     paired = {joint_of(side, kind) for kind in NORMAL for side in SIDES}
     for place in seen.joints():
         twin = place.name.replace("left_", "right_") if place.name.startswith("left_") else ""
@@ -75,7 +75,7 @@ def _single(seen: Observations) -> Iterator[Place]:
 
 
 def _walks(seen: Observations, pairs: list[Pair | str]) -> bool:
-    """Whether legs go to and fro: two joints at least that go as far as walking takes."""
+    """Return whether the legs swing: two joints at least move as far as in walking."""
     moving = [
         one
         for pair in pairs
@@ -190,7 +190,7 @@ def sign(seen: Observations) -> Iterator[Verdict]:
 
 
 def _unseen(seen: Observations, rule: str, found: Gait) -> Iterator[Unknown]:
-    """Joints of which nothing was seen, or whose names say no side."""
+    """Yield joints of which nothing was seen, or whose names say no side."""
     known = {joint_of(side, kind): (kind, side) for kind in NORMAL for side in SIDES}
     for place in seen.joints():
         if known.get(place.name) not in found.matches:

@@ -77,7 +77,7 @@ def heartbeat(seen: Observations) -> Iterator[Verdict]:
 
 
 def _hears(seen: Observations, place: Place) -> bool | None:
-    """Whether its heartbeat was heard; `None` where its bus was not listened to, or is silent."""
+    """Return whether its heartbeat was heard; `None` if its bus was not listened to, or is silent."""
     ids = seen.heard_on(place.table.bus)
     return None if ids is None else 0x700 + place.table.node_id in ids
 

@@ -59,7 +59,7 @@ def _other_rates(seen: Observations, name: str, settings: CanSettings) -> Iterat
 
 
 def _all_have(seen: Observations, bus: str, rate: int) -> bool:
-    """Whether every device's file names that rate."""
+    """Return whether every device's file names that rate."""
     tables = (place for place in seen.nodes() if place.table.bus == bus)
     files = [seen.descriptions[place.name] for place in tables if place.name in seen.descriptions]
     named = [getattr(one.object_dictionary.device_information, "allowed_baudrates", None) for one in files]

@@ -21,7 +21,7 @@ def finding_infos(findings: Iterable[Finding]) -> list[FindingInfo]:
 
 
 def bus_infos(buses: Mapping[str, CanBus], now_ns: int) -> list[BusInfo]:
-    """Every bus, as it is now."""
+    """Return every bus, as it is now."""
     return [_bus(bus, now_ns) for bus in buses.values()]
 
 
@@ -46,7 +46,7 @@ def _bus(bus: CanBus, now_ns: int) -> BusInfo:
 
 
 def _strangers(bus: CanBus) -> list[int]:
-    """Nodes whose heartbeat has come although no table has them; ours is nobody's."""
+    """Return nodes whose heartbeat has come although no table has them; ours is nobody's."""
     heard = {can_id - HEARTBEAT for can_id in bus.unclaimed.copy()}
     return sorted(node_id for node_id in heard if 0 < node_id <= 127 and node_id not in bus.nodes)
 

@@ -111,7 +111,7 @@ class ComponentModule:
         return [whole(one) for one in (*components, *self.sources)]
 
     def when_ready(self, names: Iterable[str]) -> "Future[None]":
-        """Done when these components are there, or the time for a cold start is over.
+        """Return a future, done when these components are there, or the time for a cold start is over.
 
         A device whose first reading is still under way then (a busy computer, a slow bus) has longer.
         """
@@ -124,7 +124,7 @@ class ComponentModule:
         return self._when(over)
 
     def when_known(self, selections: Iterable[Selection]) -> "Future[None]":
-        """Done when these channels have had their first values, or the time for a cold start is over."""
+        """Return a future, done when these channels had first values, or a cold start's time is over."""
         wanted = tuple(selections)
         return self._when(lambda: self._is_warm() or all(map(_has_values, wanted)))
 
@@ -157,7 +157,7 @@ class ComponentModule:
         }
 
     def components(self) -> list[ComponentInfo]:
-        """Every component of the file, there or not, in the file's order."""
+        """Return every component of the file, there or not, in the file's order."""
         now_ns = time.monotonic_ns()
         return [self._info(name, now_ns) for name in self._names()]
 
@@ -189,7 +189,7 @@ class ComponentModule:
         return ComponentInfo(name, kind.value, ComponentState.LOST.value, why, device, angle=angle)
 
     def _angle(self, name: str) -> AngleInfo | UnsetType:
-        """As the robot's file says it, whether the drive is there or not."""
+        """Return it as the robot's file says it, whether the drive is there or not."""
         settings = self._context.config.joint.get(name)
         return UNSET if settings is None else AngleInfo(settings.rad_per_count, settings.zero_offset)
 
@@ -198,7 +198,7 @@ class ComponentModule:
         return UNSET if description is None else dict(facts(self._context.config, name, description))
 
     def buses(self) -> list[BusInfo]:
-        """Every CAN bus of the file."""
+        """Return every CAN bus of the file."""
         return bus_infos(self.robot.buses, time.monotonic_ns())
 
     def channels(self) -> list[ChannelInfo]:
@@ -226,7 +226,7 @@ class ComponentModule:
         return component is None or component.quality(time.monotonic_ns()).state is not ComponentState.LOST
 
     def _is_late(self, name: str) -> bool:
-        """Whether it is being read for the first time, and is worth waiting for."""
+        """Return whether it is being read for the first time, and is worth waiting for."""
         node = getattr(self.robot.components.get(name), "node", None)
         return node is not None and node.comes_up and time.monotonic_ns() < self._late_ns
 
@@ -257,6 +257,6 @@ def _has_values(selection: Selection) -> bool:
 
 
 def _layout(component: Component) -> LayoutInfo | UnsetType:
-    """Where the cells are, of a component that has some."""
+    """Return the places of a component's cells, if it has some."""
     layout = getattr(component, "layout", None)
     return UNSET if layout is None else LayoutInfo(layout.name, list(layout.cells))

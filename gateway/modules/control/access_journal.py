@@ -40,7 +40,7 @@ class AccessJournal:
         self._told: People | None = None
 
     def look(self) -> None:
-        """At who is let in now, if that has changed; what cannot be seen is in nobody's way."""
+        """Look who is let in now, if that has changed; what cannot be seen is in nobody's way."""
         try:
             stamp = self._folder.stamp()
             if stamp == self._stamp:

@@ -33,7 +33,7 @@ class Catalogue(Mapping[str, Parameter]):
         return len(self._by_name)
 
     def chosen(self, names: Sequence[str] | None) -> list[Parameter]:
-        """Those that the names, addresses and globs mean; without any, all that are not locked.
+        """Return those that the names, addresses and globs mean; without any, all that are not locked.
 
         Raises:
             RpcError: unknown_name, for one that means nothing.
@@ -52,7 +52,7 @@ class Catalogue(Mapping[str, Parameter]):
 def resolve(
     config: RobotConfig, descriptions: Mapping[str, Description], absent: Mapping[str, str]
 ) -> Catalogue:
-    """Every parameter of the robot; what cannot be used says why."""
+    """Return every parameter of the robot; what cannot be used says why."""
     own = [described(name, one, descriptions, absent) for name, one in config.parameter.items()]
     return Catalogue([*own, *offered(config, descriptions, own)])
 

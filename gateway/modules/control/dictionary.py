@@ -164,7 +164,7 @@ class Objects:
         return None if found is None else found.node
 
     def read_all(self, wanted: Sequence[Wanted]) -> "Future[list[ObjectValue]]":
-        """For `Reads`: these are of one device."""
+        """Read these for `Reads`: they are of one device."""
         why = {name: self._why_unasked(name) for name in {one.component for one in wanted}}
         asked = [one for one in wanted if why[one.component] is None and self._unreadable(one) is None]
         if not asked:
@@ -230,7 +230,7 @@ def by_eds(variable: "ODVariable") -> ObjectInfo:
 
 
 def unreadable(variable: "ODVariable | None") -> str | None:
-    """Why an object is not read; `None` where it is."""
+    """Return why an object is not read; `None` if it is."""
     if variable is None or variable.access_type.lower() not in READABLE:
         return "it cannot be read, the EDS says"
     if variable.data_type == DOMAIN:

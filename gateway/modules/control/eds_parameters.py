@@ -88,7 +88,7 @@ class _Offer:
         }
 
     def parameters(self, *, common: bool) -> Iterator[Parameter]:
-        """Those of its own axis, and those that all axes of the node share where `common` says so."""
+        """Yield those of its own axis, and those that all axes of the node share where `common` says so."""
         variables = [one for one in self._description.variables() if self._is_offered(one, common=common)]
         names = self._names(variables)
         for variable, name in zip(variables, names, strict=True):

@@ -77,7 +77,7 @@ class Leases:
             raise refuse(ErrorKind.NO_LEASE, "this connection holds no lease; call control.acquire first")
 
     def held_by(self, session: "Session") -> bool:
-        """Whether the connection may write now."""
+        """Return whether the connection may write now."""
         held = self._lease
         return held is not None and held.session is session and time.monotonic_ns() < held.expires_ns
 

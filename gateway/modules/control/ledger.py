@@ -80,7 +80,7 @@ class WriteLedger:
         return bytes.fromhex(goals.get(change.name, before.hex()))
 
     def begin(self, changes: Sequence[ObjectWrite], before: Mapping[str, bytes]) -> None:
-        """Before the first download; raises `RpcError` where it cannot be kept, and nothing is written."""
+        """Note it before the first download; raises `RpcError` if it cannot: then nothing is written."""
         self.changes = tuple(self._entry(change, before[change.name]) for change in changes)
         undo = Undo(self.number, self._who, time.time_ns(), self.trial_s is not None, self.changes)
         with self._or_refuse("nothing was written"):

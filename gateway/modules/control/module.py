@@ -187,7 +187,7 @@ class ControlModule:
         self._admissions.tell(known)
 
     def _look_who_is_known(self) -> None:
-        """Whoever is there or not: that somebody was let in, or is no more, is told when it happens."""
+        """Look who is let in, even if nobody is there: who is new, or is no more, is told at once."""
         if self._watching:
             self._admissions.look()
             self._context.loop.call_later(LOOK_S, self._look_who_is_known)

@@ -51,7 +51,7 @@ _BEYOND = {Limit.MIN: "below the minimum", Limit.MAX: "above the maximum"}
 
 
 def contradiction(least: Number | None, most: Number | None, where: str) -> str | None:
-    """Why no value can be within limits that contradict each other; `None` where they do not."""
+    """Return why no value can be within limits that contradict each other; `None` if they do not."""
     if least is None or most is None or least <= most:
         return None
     return f"its limits allow nothing: minimum {text(least)} is above maximum {text(most)}; correct {where}"

@@ -78,7 +78,7 @@ class Attempt:
         return LOCKED if claimed else self._authority.objection_to(address)
 
     def _is_written_again(self, address: Address) -> bool:
-        """By a later write that is to be taken back too, and first."""
+        """Return whether a later write that is to be taken back, too, and first, writes it again."""
         writes = [undo.write for undo in self._undos.all()]
         later = self._undos.all()[writes.index(self._write) + 1 :]
         return any(change.address == address for undo in later for change in undo.changes)

@@ -73,7 +73,7 @@ class Rules:
         return node
 
     def silence(self, component: str) -> str | None:
-        """Why a device cannot be asked. Whether its samples come is another matter."""
+        """Return why a device cannot be asked. Whether its samples come is another matter."""
         found: Any = self._component.robot.components.get(component)
         if found is None:
             return self._component.absent.get(component, "it is not there")
@@ -82,7 +82,7 @@ class Rules:
         return str(self._component.quality(component, time.monotonic_ns())["problem"] or "it is silent")
 
     def absence(self, component: str) -> str | None:
-        """Why what was read of a device may hold no longer: it is lost, and its node says nothing either.
+        """Return why readings of a device may hold no longer: it is lost, and its node is silent, too.
 
         A joint is lost without its position, though a node that waits for its master answers.
         """
@@ -141,7 +141,7 @@ class Rules:
             raise parameter.refusal(ErrorKind.OUT_OF_LIMIT, text, most)
 
     def bars(self, parameter: str, joints: Iterable[str]) -> bool:
-        """Whether a parameter cannot be written any more once one of these joints is enabled."""
+        """Return whether a parameter cannot be written any more once one of these joints is enabled."""
         found = self._parameters.get(parameter)
         if found is None or _may_be_enabled(found):
             return False
@@ -162,7 +162,7 @@ class Rules:
                 raise parameter.refusal(ErrorKind.WRONG_STATE, text)
 
     def states(self, drives: Collection[str]) -> dict[str, Known]:
-        """Each drive's state as it says now, all of them asked at once."""
+        """Return each drive's state as it says now, all of them asked at once."""
         components = self._component.robot.components
         told = results({drive: self._ask(drive) for drive in drives if drive in components})
         return {drive: self._known(drive, told.get(drive)) for drive in drives}

@@ -31,7 +31,7 @@ class Leave:
     overtaken: Callable[[], str | None]  # by what it has become pointless
 
     def objection(self, address: Address) -> str | None:
-        """Why an object must not be written now, in words. From any thread."""
+        """Return why an object must not be written now, in words. From any thread."""
         return self.overtaken() or self.permit.objection(address)
 
     def kind(self, said: str) -> ErrorKind:
@@ -198,7 +198,7 @@ class Transaction:
 
 
 def _answer(cause: RpcError, outcome: dict[str, str]) -> RpcError:
-    """Why a write has failed, and what became of each parameter."""
+    """Return why a write has failed, and what became of each parameter."""
     failed = [name for name, what in outcome.items() if what not in {NOT_WRITTEN, *AS_IT_SHOULD_BE}]
     taken_back = TAKEN_BACK in outcome.values()
     kind = ErrorKind.ROLLBACK_FAILED if failed else ErrorKind.ROLLED_BACK if taken_back else cause.kind

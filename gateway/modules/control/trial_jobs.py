@@ -81,7 +81,7 @@ class TrialJobs:
         return found
 
     def concerned(self) -> bool:
-        """Whether there is anything to claim. From any thread."""
+        """Return whether there is anything to claim. From any thread."""
         changes = (change for undo in self._undos.all() for change in undo.changes)
         return any(change.address in self._authority.locked for change in changes)
 

@@ -132,7 +132,7 @@ class Tuning:
         return self.trials.claim()
 
     def enabling_objection(self, joints: Iterable[str]) -> str | None:
-        """Why these drives must not be enabled now: what is on trial could not be taken back then."""
+        """Return why these drives must not be enabled now: a value on trial could not be taken back then."""
         names = {one.name: "is being written" for asked in self._asked for one in asked.changes}
         for trial in self.trials.infos():
             how = f"is on trial (write {trial.write} of {trial.who}); confirm or revert that first"
@@ -196,7 +196,7 @@ class Tuning:
             self._known.pop(name, None)
 
     def _lost(self, parameters: Iterable[Parameter]) -> dict[str, str]:
-        """Why what was read last may hold no longer; of each device that has one of these parameters."""
+        """Return why the last readings may hold no longer, by device that has one of these parameters."""
         names = {one.component for one in parameters if one.problem is None}
         absent = ((name, self._rules.absence(name)) for name in names)
         return {name: f"{name} is not there: {why}" for name, why in absent if why is not None}
@@ -207,7 +207,7 @@ class Tuning:
         return _value(parameter, value, stamp_ns, problem)
 
     def _read_any(self, chosen: "Sequence[Parameter | Wanted]") -> "Future[list[Any]]":
-        """For `Reads`: these are of one request, which is for parameters or for objects."""
+        """Read these for `Reads`: they are of one request, which is for parameters or for objects."""
         parameters = [one for one in chosen if isinstance(one, Parameter)]
         objects = [one for one in chosen if isinstance(one, Wanted)]
         return self._read_all(parameters) if parameters else self.objects.read_all(objects)
@@ -240,12 +240,12 @@ class Tuning:
         return itertools.islice(itertools.chain(found, itertools.repeat(last)), len(asked))
 
     def _why_unasked(self, component: str) -> str | None:
-        """Why it cannot be asked, or is not asked again so soon."""
+        """Return why it cannot be asked, or is not asked again so soon."""
         silence = self._rules.silence(component)
         return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
 
     def _refusal(self, parameter: Parameter, unasked: str | None) -> RpcError | None:
-        """Why it is not asked for."""
+        """Return why it is not asked for."""
         problem = parameter.problem or unasked
         if problem is not None:
             return parameter.refusal(ErrorKind.UNAVAILABLE, problem)

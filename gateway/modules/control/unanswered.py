@@ -29,7 +29,7 @@ class Unanswered:
         self._missed.update(dict.fromkeys(components, missed))
 
     def why(self, component: str) -> str | None:
-        """Why it is not asked just now; `None` where it may be."""
+        """Return why it is not asked just now; `None` where it may be."""
         missed = self._missed.get(component)
         if missed is None:
             return None

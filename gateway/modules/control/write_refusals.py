@@ -78,7 +78,7 @@ def _no_parameter(
 
 
 def _released(table: Table, parameter: Parameter) -> str:
-    """Its whole name beside what is released already: what a glob does not reach is reached so."""
+    """Return its whole name beside what is released already: what a glob does not reach is reached so."""
     names = [*table.settings.release, parameter.name.partition(".")[2]]
     return f"{table.header}\nrelease = [{', '.join(_quoted(name) for name in names)}]"
 
@@ -93,6 +93,6 @@ def _own_table(variable: "ODVariable", table: Table, taken: AbstractSet[str]) ->
 
 
 def _quoted(text: str) -> str:
-    """As a basic string of TOML."""
+    """Return it as a basic string of TOML."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

@@ -32,7 +32,7 @@ class Counters(Protocol):
         """Every process that can be seen, kernel threads too; those that end meanwhile are left out."""
 
     def cores(self) -> list[CoreTimes]:
-        """Each core that is online."""
+        """Return each core that is online."""
 
     def memory(self) -> MemoryUse:
         """Return the memory of the whole computer."""
@@ -41,7 +41,7 @@ class Counters(Protocol):
         """Return the resident memory of this process."""
 
     def command_line(self, pid: int) -> list[str]:
-        """Its words, none where there is none to be seen."""
+        """Return its words, none where there is none to be seen."""
 
     def close(self) -> None:
         """Give every descriptor back."""

@@ -23,13 +23,13 @@ _TIME_ERROR = 5  # of adjtimex(2): the clock is not synchronised
 
 
 def disk() -> tuple[int, int] | None:
-    """Bytes read and written since boot, over all disks."""
+    """Return bytes read and written since boot, over all disks."""
     counters = psutil.disk_io_counters()
     return None if counters is None else (counters.read_bytes, counters.write_bytes)
 
 
 def network() -> tuple[int, int]:
-    """Bytes received and sent since boot, over all interfaces."""
+    """Return bytes received and sent since boot, over all interfaces."""
     counters = psutil.net_io_counters()
     return counters.bytes_recv, counters.bytes_sent
 
@@ -47,7 +47,7 @@ def thermal() -> dict[str, float | None]:
 
 
 def throttling(root: Path = SYS) -> Throttling:
-    """Whether the cores are held back; `root` is where sysfs is mounted."""
+    """Return whether the cores are held back; `root` is where sysfs is mounted."""
     counts = [
         int(text)
         for file in root.glob("devices/system/cpu/cpu*/thermal_throttle/core_throttle_count")

@@ -45,7 +45,7 @@ class Host:
 
 
 def _counters() -> Counters:
-    """How they are read on this system; what the other way needs is not even imported."""
+    """Return the counters of this system; the other way's needs are not even imported."""
     if sys.platform == "linux":
         from gateway.modules.resource.procfs import Procfs
 

@@ -144,7 +144,7 @@ class ResourceModule:
         self._host.close()
 
     def meter(self) -> "Meter":
-        """For another asker, whose percentages are since its own last look."""
+        """Return a meter for another asker, whose percentages are since its own last look."""
         return self._host.meter()
 
     def own_rss_bytes(self) -> int:
@@ -185,7 +185,7 @@ class ResourceModule:
         return self._for(session, lambda: msgspec.Raw(_encoder.encode(meter.snapshot(params))))
 
     def _for(self, session: "Session", work: Callable[[], T]) -> "Future[T]":
-        """Done by the worker in turn, and put down on the session's account."""
+        """Let the worker do it in turn, on the session's account."""
         answer: Future[T] = Future()
 
         def metered() -> tuple[T, int]:

@@ -66,7 +66,7 @@ class Judge:
         self._usual: deque[int] = deque(maxlen=USUAL)
 
     def in_time(self, cycles: int, before: Look, after: Look, control: Collection[int]) -> None:
-        """So many cycles that came in time."""
+        """Count so many cycles that came in time."""
         self._usual.append(_own(before, after, control).ran_ns // cycles)
 
     def late(self, late: Late, cycles: int, before: Look, after: Look, control: Collection[int]) -> Blame:

@@ -115,7 +115,7 @@ class Tasks:
         return Schedule(policy, priority, int(fields[_CORE]), int(fields[_STARTTIME]) * TICK_NS)
 
     def cores(self, pid: int) -> set[int]:
-        """Those that a process may run on; none where it has ended."""
+        """Return those that a process may run on; none where it has ended."""
         text = (self._read((pid, pid), "status") or b"").decode(errors="replace")
         listed = text.partition("Cpus_allowed_list:")[2].partition("\n")[0].strip()
         ends = [one.partition("-") for one in listed.split(",") if one]

@@ -35,7 +35,7 @@ class Permit:
     asked_ns: int  # when it came in
 
     def objection(self, address: Address) -> str | None:
-        """Why the object must not be written now, in words; `None` where it may. From any thread."""
+        """Return why the object must not be written now, in words; `None` if it may. From any thread."""
         if self.authority.state.asked_ns >= self.asked_ns:
             return "the robot was stopped before this was written"
         return self.authority.objection_to(address) or self.authority.frozen()
@@ -77,11 +77,11 @@ class Authority:
         return after
 
     def settled(self) -> "contextlib.AbstractContextManager[object]":
-        """While inside, nothing happens."""
+        """Keep everything from happening within the block."""
         return self._lock
 
     def is_newest(self, number: int) -> bool:
-        """Whether nothing has begun since the undertaking of this number."""
+        """Return whether nothing has begun since the undertaking of this number."""
         return self.state.number == number
 
     def unproved(self, findings: Mapping[str, ResetFinding]) -> list[str]:
@@ -89,9 +89,9 @@ class Authority:
         return list(unproved(self.state, findings))
 
     def permit(self, asked_ns: int) -> Permit:
-        """For a write that came in at that time (monotonic)."""
+        """Return the permit for a write that came in at that time (monotonic)."""
         return Permit(self, asked_ns)
 
     def objection_to(self, address: Address) -> str | None:
-        """Why an object must not be written now, whoever wants it and since when."""
+        """Return why an object must not be written now, whoever wants it and since when."""
         return LOCKED if address in self.locked and self.held else None

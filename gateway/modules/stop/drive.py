@@ -48,7 +48,7 @@ class Drive(Protocol):
 
 
 def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":
-    """Never raises: the other drives are to be stopped all the same."""
+    """Stop it; never raises: the other drives are to be stopped all the same."""
     try:
         return drive.quick_stop(wake=wake)
     except Exception as error:  # noqa: BLE001 - it becomes the future's
@@ -56,5 +56,5 @@ def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":
 
 
 def is_enabled(statusword: float) -> bool:
-    """Whether a statusword (6041h) says OPERATION ENABLED."""
+    """Return whether a statusword (6041h) says OPERATION ENABLED."""
     return drive_state(int(statusword)) is DriveState.OPERATION_ENABLED

@@ -75,7 +75,7 @@ class Enabling:
         return then(stops, lambda found: self._given_up(problems, found))
 
     def _given_up(self, problems: dict[str, str], stops: Mapping[str, object]) -> "Future[Enabled]":
-        """Where the drives are now is read once more."""
+        """Read once more where the drives are now."""
         seen = {name: _call(drive.look) for name, drive in self._drives.items()}
         return then(back(self._loop, gather(seen)), lambda found: self._seen(problems, stops, found))
 

@@ -99,7 +99,7 @@ class Lowering:
 
 
 def _last(led: Led, seen: Led) -> Led:
-    """Where it is by the last reading; what its way down said stays the reason why it did not arrive."""
+    """Return its last reading; what its way down said stays the reason why it did not arrive."""
     overtaken = led.problem == OVERTAKEN and seen.state in AT_REST  # the stop has come to an end meanwhile
     problem = seen.problem or (None if overtaken else led.problem)
     if problem is None and seen.state not in (led.state, *AT_REST):

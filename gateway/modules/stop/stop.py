@@ -57,7 +57,7 @@ class StopAnswers:
         return self._answer_in_time(stops, last, kept or done(None))
 
     def _once_more(self, name: str, first: "Future[Report]") -> "Future[Report]":
-        """On a cold start the first attempt may come before the bus is open; a confirmed one is enough."""
+        """Stop once more: on a cold start the first attempt may precede the bus; one confirmed is enough."""
         ready = self._when_ready(name)
         if ready.done():
             return first

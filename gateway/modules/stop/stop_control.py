@@ -163,7 +163,7 @@ class StopControl:
         return asked.answer
 
     def _act(self, asked: Asked, target: str, step: Transition) -> None:
-        """Under the machine's lock: in the order of events, and without waiting for anything."""
+        """Act under the machine's lock: in the order of events, and without waiting for anything."""
         for action in step.actions:
             if action is Action.STOP_ALL:
                 self._wait(_Waiting(asked, step.number, recorded=Action.RECORD in step.actions))
@@ -256,7 +256,7 @@ class StopControl:
         return then(down, lambda descent: self._prove(who, number, descent))
 
     def _settled(self) -> "Future[object]":
-        """Done when every stop that was asked for until now has acted, and claimed what it has set."""
+        """Return a future, done when every stop asked for until now has acted, and claimed what it set."""
         acted: Future[object] = Future()
         self._thread.put(lambda: gather({"claimed": self._claimed}).add_done_callback(acted.set_result))
         return back(self._loop, acted)
@@ -389,7 +389,7 @@ class StopControl:
     # Words
 
     def info(self, armed: Callable[[str], bool]) -> StopInfo:
-        """As `robot.describe` shows it."""
+        """Return it as `robot.describe` shows it."""
         held = self._record.held if self.held else None
         return StopInfo(
             held=self.held,

@@ -109,7 +109,7 @@ class StopWatch:
             self._tell(name, self._times[name])
 
     def _is_left_alone(self, stopper: Stopper) -> bool:
-        """Whether no axis of its node has been asked to stop for a while; or itself for long."""
+        """Return whether no axis of its node was asked to stop for a while; or itself for long."""
         node = stopper.drive.node
         return stopper.idle_s >= AT_LEAST_S or all(
             one.idle_s >= LOOK_S for one in self._stoppers.values() if one.drive.node is node

@@ -25,7 +25,7 @@ def packet(descriptor_set: int, fields: dict[int, bytes]) -> bytes:
 
 
 def _down(vector: Vector) -> Vector:
-    """From x forward, y left, z up to x forward, y right, z down."""
+    """Turn x forward, y left, z up to x forward, y right, z down."""
     x, y, z = vector
     return x, -y, -z
 

@@ -21,7 +21,7 @@ _PRESSURE = 101.3  # kPa
 
 
 def _down(vector: Vector) -> Vector:
-    """From x forward, y left, z up to x forward, y right, z down."""
+    """Turn x forward, y left, z up to x forward, y right, z down."""
     x, y, z = vector
     return x, -y, -z
 

@@ -87,7 +87,7 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
         return mean
 
     def alarms(self, x: Features, recording: Integers, rows: npt.NDArray[np.intp] | None = None) -> Flags:
-        """Whether the mean of the last decisions is over the threshold, at every row or at `rows`."""
+        """Return whether the mean of the last decisions is over the threshold, at every row or at `rows`."""
         rows = np.arange(len(x)) if rows is None else rows
         falls = probability_of(self, x, rows)
         return trailing_mean(falls, recording[rows], self.settings.decisions) >= self.threshold_

@@ -46,7 +46,7 @@ class QuickTrees:
         ]
 
     def _leaves(self, x: Features) -> npt.NDArray[np.intp]:
-        """Every row's leaf of every tree, row by row."""
+        """Return every row's leaf of every tree, row by row."""
         node = np.tile(self._first, len(x))
         row = np.repeat(np.arange(len(x)) * x.shape[1], len(self._first))
         flat = np.ascontiguousarray(x).ravel()
@@ -62,7 +62,7 @@ class QuickTrees:
 
 
 def _trees(model: HistGradientBoostingClassifier) -> list[npt.NDArray[np.void]]:
-    """Each tree's nodes: scikit-learn has no public way to them."""
+    """Return each tree's nodes: scikit-learn has no public way to them."""
     return [tree.nodes for one in model._predictors for tree in one]  # noqa: SLF001
 
 

@@ -140,7 +140,7 @@ class Alarms:
         self._show(gather(self._active.values()))
 
     def acknowledge(self, key: tuple[Kind, str]) -> None:
-        """Somebody has read it, and what it explains; it is shown smaller until it is over."""
+        """Note that somebody has read it, and what it explains; it is shown smaller until it is over."""
         read = {key} | {under.key for one in self._shown if one.alarm.key == key for under in one.alarm.under}
         for each in read & self._active.keys():
             self._active[each] = dataclasses.replace(self._active[each], is_acknowledged=True)

@@ -59,13 +59,13 @@ class Stalls:
         self._known: deque[Stall] = deque(maxlen=32)
 
     def is_news(self, stall: Stall) -> bool:
-        """Whether it is to be told: it is long, and far longer than those before it that are told with it."""
+        """Return whether to tell it: it is long, and far longer than those told with it before."""
         told = (one.lasted_s for one in self.latest[:-1] if one.lasted_s >= STOOD_S)
         before = max(told, default=0.0)
         return stall.lasted_s >= max(STOOD_S, NEWS_TIMES * before)
 
     def forget(self) -> None:
-        """Another link: what lies between is not the gateway's."""
+        """Forget the past at another link: what lies between is not the gateway's."""
         self._before = None
 
     def take(

@@ -11,6 +11,7 @@ from server_gui.core.follow.robot import Robot
 
 OURS: Final = "this computer is overloaded, end other programs on it first"
 THEIRS: Final = "the robot's computer is overloaded, see what keeps it busy first (gwrms blame)"
+UNPLUGGED: Final = "does not exist"  # as drivers say of a port
 SILENT: Final = frozenset({Kind.NO_LINK, Kind.STALE, Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
 
 
@@ -24,9 +25,12 @@ def overloaded(robot: Robot, *, is_ours: bool) -> tuple[str, ...]:
 
 
 def load_first(alarms: Iterable[Alarm], first: tuple[str, ...]) -> Iterator[Alarm]:
-    """Yield the alarms; of what is silent or stale the overloaded computers are checked first."""
+    """Yield the alarms; of what is silent or stale the overloaded computers are checked first.
+
+    Not of what is unplugged: no load takes a port away.
+    """
     for one in alarms:
-        if first and one.kind in SILENT:
+        if first and one.kind in SILENT and UNPLUGGED not in one.what:
             yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, one.check))))
         else:
             yield one

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.client import ConnectionState
+from gateway.client import NOTHING_SENT, ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
@@ -121,7 +121,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
 
 def _then(why: str) -> str:
     """Return why a STOP failed, said when that is past: there is a link again."""
-    return "there was no link" if why.startswith("there is no link") else why
+    return "there was no link" if why.startswith(NOTHING_SENT) else why
 
 
 def role_of(robot: Robot) -> str | None:
@@ -132,7 +132,9 @@ def role_of(robot: Robot) -> str | None:
 def remedy(robot: Robot) -> str:
     """Return what to do after a STOP that nobody has confirmed."""
     is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
-    return "STOP again to be sure" if is_off else "use the hardware stop"
+    if is_off:
+        return "STOP again to be sure"
+    return "STOP again, or use the hardware stop" if _is_live(robot) else "use the hardware stop"
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
@@ -155,12 +157,12 @@ def _after_unconfirmed(robot: Robot) -> str:
 
 
 def any_enabled(robot: Robot) -> bool:
-    """Whether some drive is, as far as is known."""
+    """Return whether some drive is enabled, as far as is known."""
     return ENABLED in _words(robot).values()
 
 
 def _moving(robot: Robot) -> list[str]:
-    """Joints whose drive is enabled, or that turn."""
+    """Return joints whose drive is enabled, or that turn."""
     words = _words(robot)
     return [
         joint
@@ -245,7 +247,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
-    """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
+    """Return why a drive is in fault, and its code: as the robot says, else by the drive's own code."""
     said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
     found = _CODE.search(said)
     if found is not None:
@@ -394,7 +396,7 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:
-    """From advice on; what was so when it was known last does not end by being unknown."""
+    """Yield the alarm from advice on; what was so last does not end by being unknown."""
     shown = facts.danger
     known = None if shown is None else shown.known
     if shown is None or known is None or known.level < Level.ADVICE:

@@ -105,13 +105,13 @@ TEXTS: Final = dict(
             "warn",
             "look at the wearer and the robot; it is on trial, and may be wrong (gwrms docs danger)",
         ),
-        _text(Kind.IMPLAUSIBLE, "square", "bad", "check the encoder or sensor, and its cable"),
+        _text(Kind.IMPLAUSIBLE, "square", "bad", "look its code up in the device's manual; check its cable"),
         _text(Kind.LOST, "cross", "bad", "check its power, its cable and its address"),
         _text(
             Kind.STOPPED,
             "triangle",
             "warn",
-            f"to go on: see that nobody is in danger, “Reset stop…”, then {_ENABLE}",
+            f"to go on: “Reset stop…” once nobody is in danger; then {_ENABLE}",
         ),
         _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
         _text(
@@ -146,7 +146,7 @@ TEXTS: Final = dict(
             Kind.RESET,
             "ring",
             "dim",
-            f"to go on: {_ENABLE}; nothing moves until then",
+            f"to go on: {_ENABLE}",
         ),
     )
 )

@@ -90,7 +90,7 @@ class Archive:
         return True
 
     def _robots(self) -> set[str]:
-        """Those of the server's file, and those that are shown."""
+        """Return those of the server's file, and those that are shown."""
         return {*self.settings.robots, *(station.name for station in self._desk)}
 
     @property

@@ -132,7 +132,7 @@ def _stored(url: str) -> list[dict[str, Any]]:
 
 
 def _parts(rows: pa.Table) -> list[pa.Table]:
-    """Those of each robot that came by one spool, however often that was begun anew."""
+    """Return those of each robot that came by one spool, however often that was begun anew."""
     whose = pc.replace_substring_regex(rows["spool"], "/.*", "")
     rows = rows.append_column("whose", whose)
     keys = rows.group_by(["robot", "whose"]).aggregate([]).to_pylist()

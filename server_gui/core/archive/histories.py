@@ -66,7 +66,7 @@ class History:
 
 
 def histories(desk: Desk, found: JournalsFound) -> dict[str, History]:
-    """By title: the robots of the desk, then those of which something was collected, though they are away."""
+    """Return them by title: the desk's robots, then those that are away, but were collected."""
     away = dict(found.by_robot)
     called = {
         station.title: History(

@@ -170,7 +170,7 @@ def check(new: Sequence[Label], known: Iterable[Label], session: Session) -> Non
 
 
 def span(session: Session) -> tuple[int, int]:
-    """From when to when the session goes, UTC in ns; one that has not ended goes until now."""
+    """Return from when to when the session goes, UTC in ns; one that has not ended goes until now."""
     begins = [utc_ns(time) for time in (session.began, session.first) if time is not None]
     ends = [utc_ns(time) for time in (session.ended, session.last) if time is not None]
     if session.ended is None:

@@ -165,7 +165,7 @@ def _opened(settings: ServerSettings) -> Store | Found:
 
 
 def _gone(settings: ServerSettings) -> str | None:
-    """Why there should be a store: this computer has brought something to it."""
+    """Return why there should be a store: this computer has brought something to it."""
     newest, url = Receipts(settings.recorder.spool / RECEIPTS).newest(), settings.store.url
     if newest is None or newest.url != url:
         return None

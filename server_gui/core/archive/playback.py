@@ -251,7 +251,7 @@ class Playback:
         return True
 
     def _begin_anew(self, tape: Tape) -> None:
-        """To views, a jump is as if the robot's computer had started anew."""
+        """Begin anew: to views, a jump is as if the robot's computer had started anew."""
         self._jumps += 1
         self._robot.row_ns = self._robot.stamp_ns = None
         self._said = {}
@@ -321,13 +321,13 @@ class Playback:
 
 
 def _rate(tape: Tape) -> float:
-    """Rows a second, as far as the store knows."""
+    """Return rows a second, as far as the store knows."""
     seconds = tape.session.length.total_seconds()
     return tape.session.rows / seconds if seconds else 0.0
 
 
 def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str, str]]:
-    """Those that are told, and those of drives."""
+    """Return those that are told, and those of drives."""
     joints = [name.rpartition(".")[0] for name in tape.units if name.endswith(".position")]
     usual = {f"{joint}.state": DRIVE_STATES for joint in joints if f"{joint}.state" in tape.units}
     return usual | dict(told)

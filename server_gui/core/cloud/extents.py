@@ -50,7 +50,7 @@ def differing(file: DataFile, metadata: pq.FileMetaData) -> Iterator[str]:
 
 
 def _fits(told: _Extent, ends: _Extent, slack: Any) -> bool:
-    """Whether rows from one end to the other are within what was told, which is hardly more."""
+    """Return whether rows from one end to the other are within what was told, which is hardly more."""
     return bool(told[0] <= ends[0] <= told[0] + slack and told[1] - slack <= ends[1] <= told[1])
 
 
@@ -62,7 +62,7 @@ def _words(name: str, told: _Extent, ends: _Extent, who: str) -> str:
 
 
 def _of_footer(metadata: pq.FileMetaData) -> dict[str, _Extent]:
-    """As its row groups have it together; without what one of them does not tell."""
+    """Return it as its row groups have it together; without what one of them does not tell."""
     places = {metadata.schema.column(place).path: place for place in range(metadata.num_columns)}
     found: dict[str, _Extent] = {}
     for name in places.keys() & set(COLUMNS):

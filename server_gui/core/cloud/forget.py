@@ -127,7 +127,7 @@ def upload(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Ex
 
 
 def _are_theirs(found: mend.RepairPlan, spool: Path, known: ErasurePlan) -> bool:
-    """Whether all that is missing is in batches with rows of theirs: another computer has forgotten them.
+    """Return whether only batches with rows of theirs are missing: another computer has forgotten them.
 
     It comes back whole, with what is missing of others, and then goes with all else of theirs.
     """
@@ -194,7 +194,7 @@ def _begun(folder: Path, name: str) -> list[Name]:
 
 
 def digest(name: str) -> str:
-    """By what the event names somebody: whoever knows the name can see that it was them."""
+    """Return what the event names somebody by: whoever knows the name can see that it was them."""
     return hashlib.sha256(f"gwrms wearer {person(name)}".encode()).hexdigest()
 
 

@@ -134,7 +134,7 @@ def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, t
 def _kept(
     broken: Iterable[DataFile], proof: Proof, held: Mapping[Batch, Iterable[ReceiptPart]]
 ) -> set[Whose]:
-    """Where damaged files hold more than comes back when they go."""
+    """Return whose damaged files hold more than comes back when they go."""
     rows: Counter[tuple[Batch, Whose, object]] = Counter()
     for batch, parts in held.items():
         rows.update({_name(batch, part): part.rows for part in parts})

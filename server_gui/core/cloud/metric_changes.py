@@ -139,7 +139,7 @@ def _parts(table: pa.Table) -> Iterator[tuple[list[int], dict[str, list[float | 
 
 
 def _enabled(session: Session) -> dict[str, frozenset[float]]:
-    """By channel the numbers that mean that a drive follows its target, where that was recorded."""
+    """Return, by channel, the numbers of a drive that follows its target, if that was recorded."""
     found = {}
     for key, said in session.setup.items():
         section, _, channel = key.partition("/")

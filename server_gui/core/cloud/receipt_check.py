@@ -100,7 +100,7 @@ def prove(
 
 
 def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> list[Receipt]:
-    """Those of what went to this store, by its URL or by what its tables are called."""
+    """Return those of what went to this store, by its URL or by what its tables are called."""
     here = tables(store)
     sent_here = went_to((each for each in receipts if isinstance(each, Receipt)), store.url)
     here |= {part.table for each in sent_here for part in each.parts}
@@ -118,7 +118,7 @@ def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> 
 
 
 def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
-    """Whether its rows are as they were sent, as far as retention has left them."""
+    """Judge whether its rows are as they were sent, as far as retention has left them."""
     problem = _problem(claim, values=values)
     missing = max(claim.expected[0] - claim.there[0], 0)
     if not problem:
@@ -149,7 +149,7 @@ def tables(store: Store) -> set[str]:
 
 
 def _retained(store: Store, locations: Set[str], problems: list[str]) -> dict[str, datetime | None]:
-    """Up to which time rows were removed; where nobody can say, none were, and it is told."""
+    """Return up to which time rows were removed; if nobody can say, none were, and it is told."""
     found: dict[str, datetime | None] = {}
     for location in sorted(locations):
         try:
@@ -241,7 +241,7 @@ def _problem(claim: Claim, *, values: bool) -> str | None:
 
 
 def _is_renamed(claim: Claim) -> bool:
-    """Whether there are as many rows as were sent, and others; where values are not looked at."""
+    """Return whether there are as many rows as were sent, but others; if values are not looked at."""
     part, found = claim.part, claim.found
     return bool(part.names) and found.rows == part.rows and checksums.told(found.names) != part.names
 

@@ -209,7 +209,7 @@ class Recordings:
         return missing_rows.newer([missing_rows.by_key(self._store, location, run)], self._store, location)
 
     def _claims(self, location: str, batch: int) -> bool:
-        """Whether the table says that it has this batch of the spool, or a later one of its writer."""
+        """Return whether the table says it has this batch of the spool, or a later one of its writer."""
         return self._store is not None and self._store.has(location, self._writer(batch), batch)
 
     def _writer(self, batch: int) -> str:
@@ -274,7 +274,7 @@ class _Waiting:
         return pyarrow.dataset.dataset(pa.concat_tables(found, promote_options="default"))
 
     def channels(self, stored: Sequence[Channel]) -> list[Channel]:
-        """With those that the store has of the session."""
+        """Return the channels, with those that the store has of the session."""
         samples = self._samples + Counter({each.name: each.samples for each in stored})
         told = {each.name: each.unit for each in stored}
         return [Channel(name, told.get(name, self._unit(name)), samples[name]) for name in sorted(samples)]

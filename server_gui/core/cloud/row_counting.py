@@ -170,7 +170,7 @@ class _Look:
 
 
 def _merged(found: Iterable[Sequence[_Seen]]) -> Sequence[_Seen]:
-    """All of a file, or nothing where it cannot be read to its end."""
+    """Return all of a file, or nothing where it cannot be read to its end."""
     return [seen for batch in found for seen in batch]
 
 
@@ -258,7 +258,7 @@ def _shared(
     seqs: np.ndarray[tuple[int], np.dtype[np.int64]],
     each: _Rows,
 ) -> Iterator[_Seen]:
-    """Rows of one stream among the claims on it, each of which begins with one of `firsts`."""
+    """Yield rows of one stream among the claims on it, each of which begins with one of `firsts`."""
     places = np.searchsorted(firsts, seqs, "right") - 1
     for place in np.unique(places[places >= 0]).tolist():
         claim = claims[place]

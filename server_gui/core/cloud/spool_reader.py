@@ -162,7 +162,7 @@ def named(spool: Path, number: int) -> set[tuple[str, str]]:
 
 
 def _records(spool: Path, batch: int) -> list[tuple[int, Record]]:
-    """With their numbers; without those that are damaged."""
+    """Return the records with their numbers, without damaged ones."""
     found = _read(spool, batch, "SELECT rowid, * FROM record ORDER BY rowid")  # older ones have no checksums
     return [
         (rowid - 1, _decoder.decode(content)) for rowid, _, content, *crc in found if unaltered(content, *crc)
@@ -194,6 +194,6 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
 
 
 def _has(database: sqlite3.Connection, sql: str) -> bool:
-    """Whether there is what is asked for: there may be no tables yet, and once there was no `meta`."""
+    """Return whether it is there: there may be no tables yet, and once there was no `meta`."""
     tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
     return bool(tables) and ("meta" in tables or " meta " not in sql)

@@ -53,7 +53,7 @@ def ros_name(name: str) -> str:
 
 
 def _joints(root: str, left: dict[str, str | None]) -> Iterator[Topic]:
-    """All joints in one message; takes their channels out of `left`, as the others do with theirs."""
+    """Yield all joints in one message; takes their channels out of `left`, as the others do with theirs."""
     joints = [
         name.removesuffix(".position")
         for name, unit in left.items()

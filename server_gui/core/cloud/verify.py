@@ -83,7 +83,7 @@ def receipts_of(spool: Path) -> list[Receipt | Altered]:
 
 
 def _not_its_own(spool: Path, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
-    """Where the spool's name is damaged, and where receipts are another's, which prove nothing of its own."""
+    """Yield that the spool's name is damaged, or receipts are another's, which prove nothing here."""
     file, own = spool / "id", identity(spool)
     if not own and (file.exists() or receipts):
         yield (
@@ -295,7 +295,7 @@ def _there(spool: Path) -> set[int]:
 
 
 def _has_name(spool: Path, number: int) -> bool:
-    """Whether a batch was made since there are receipts."""
+    """Return whether a batch was made since there are receipts."""
     try:
         return spool_reader.writer(spool, number) != identity(spool)
     except SpoolUnusable:
@@ -332,7 +332,7 @@ def _without_receipt(spool: Path, unproven: Sequence[spool_reader.Batch]) -> Ite
 
 
 def told_batches(numbers: Iterable[int]) -> str:
-    """Numbers of batches in words, those that follow each other together."""
+    """Return numbers of batches in words, those that follow each other together."""
     runs: list[list[int]] = []
     for number in sorted(numbers):
         if runs and number == runs[-1][-1] + 1:
@@ -359,7 +359,7 @@ def _locations(store: Store, batch: spool_reader.Batch) -> list[str]:
 
 
 def _newest(store: Store, location: str, writer: str) -> int:
-    """Up to which of the writer's batches the table has everything."""
+    """Return up to which of the writer's batches the table has everything."""
     try:
         return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:

@@ -59,7 +59,7 @@ class Talker(Protocol):
         ...
 
     def heard(self) -> Sequence[str]:
-        """Lines that have come since the last time."""
+        """Return lines that have come since the last time."""
         ...
 
     def send(self, line: str) -> None: ...
@@ -289,7 +289,7 @@ class Commissioning:
         self.stage = Stage.BUS_GONE if line.problem else Stage.HAND
 
     def _see_to_stop(self) -> None:
-        """Where the command does not stop the drives in time, or is gone, another one does."""
+        """Let another command stop the drives if this one does not in time, or is gone."""
         if self._stop_s is None or self.wish is None:
             return
         if self._stopped is not None:

@@ -68,7 +68,7 @@ class Desk:
             station.flag(text, ago_s)
 
     def add(self, station: Station) -> None:
-        """Another robot; the first is selected."""
+        """Add a robot; the first is selected."""
         self.stations.append(station)
         station.neighbours = self.stations
         if self.selected is None:

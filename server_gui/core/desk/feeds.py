@@ -158,7 +158,7 @@ class Feeds:
         return Recording(by, keeper, deliver, news, self._why, self._collector)
 
     def follow(self, name: str, address: Address) -> None:
-        """Another robot, from now on."""
+        """Follow another robot from now on."""
         self._robots[name] = address
         if self._collector is not None:
             self._tasks[name] = self._collector.follow(name, address)

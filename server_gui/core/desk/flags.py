@@ -150,7 +150,7 @@ def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
 
 
 def _said(entry: Entry) -> str:
-    """Who did what, and why: the parameters of a write, the reason of a stop."""
+    """Return who did what, and why: the parameters of a write, the reason of a stop."""
     after, what, who = entry.get("after"), str(entry.get("what")), entry.get("who")
     about = ", ".join(map(str, after)) if isinstance(after, Mapping) else ""
     why = "" if about else str(entry.get("reason") or "")

@@ -24,5 +24,5 @@ class Pins:
                 self._by_robot[str(robot)] = {str(name) for name in names}
 
     def to_keep(self) -> dict[str, list[str]]:
-        """For the next time."""
+        """Return the pins to keep for the next time."""
         return {robot: sorted(names) for robot, names in self._by_robot.items() if names}

@@ -148,7 +148,7 @@ class Recording:
             if told.get(thread) != text:
                 self._news.add(NewsKind.WARNING, WHO, text)
         for thread in told.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"over: {told[thread]}")
+            self._news.add(NewsKind.STATE, WHO, f"no longer: {told[thread]}")
         self._threads[by] = tuple(threads)
 
     @property
@@ -162,7 +162,7 @@ class Recording:
         return since_ns is not None and now_ns() - since_ns >= for_s * 1e9
 
     def taken_over(self, keeper: Keeper, pausing: Pausing | None = None) -> None:
-        """Nobody else records any more, and this window does from now on."""
+        """Note that nobody else records any more, and this window does from now on."""
         self.by, self._keeper, self._pausing, self.why = By.WINDOW, keeper, pausing, ""
         self.report, self.problem, self._alone_since_ns, self._asking = None, None, None, False
         self._news.add(NewsKind.STATE, WHO, "nobody else records any more: this window does from now on")
@@ -318,7 +318,7 @@ class Recording:
         for kind in now.keys() - self._trouble.keys():
             self._news.add(NewsKind.WARNING, WHO, now[kind])
         for kind in self._trouble.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"over: {self._trouble[kind]}")
+            self._news.add(NewsKind.STATE, WHO, f"no longer: {self._trouble[kind]}")
         self._trouble = now
 
     def _failed(self, keeper: Keeper, error: Exception) -> None:

@@ -149,7 +149,7 @@ class Station:
         return "" if hello is None or hello.identity is None else hello.who
 
     def refused(self, method: AnyMethod) -> str:
-        """Why we may not ask for this, in the robot's words; empty where we may, as far as is known."""
+        """Return why we may not ask for this, in the robot's words; empty if we may, as far as is known."""
         return "" if self.robot.hello is None else self.robot.hello.refused.get(method.name, "")
 
     @property

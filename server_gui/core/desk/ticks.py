@@ -72,7 +72,7 @@ class Ticks:
 
 
 def nullable(column: Floats) -> list[float | None]:
-    """As batches have it: None for what is missing."""
+    """Return them as batches have them: None for what is missing."""
     return [None if value != value else value for value in column.tolist()]
 
 

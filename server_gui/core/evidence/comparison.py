@@ -222,14 +222,14 @@ def _all_of(cycles: Sequence[Cycle], spell: Spell) -> _Sided:
 
 
 def _sided(all_of: _Sided) -> _Sided:
-    """Those in activities that there are enough of on both sides."""
+    """Return those in activities that there are enough of on both sides."""
     names = np.array(all_of.activities)
     both = {name for name in names.tolist() if all_of.where(names == name).is_enough}
     return all_of.where(np.array([name in both for name in names.tolist()], dtype=np.bool_))
 
 
 def _same_speed(sided: _Sided) -> Bools:
-    """Those whose stride lasts as long as strides of the other side do."""
+    """Return those whose stride lasts as long as strides of the other side do."""
     ranges = [np.percentile(sided.stride_s[side], SAME_SPEED) for side in (sided.after, ~sided.after)]
     low = max(float(one[0]) for one in ranges) * (1.0 - AROUND)
     high = min(float(one[1]) for one in ranges) * (1.0 + AROUND)

@@ -252,7 +252,7 @@ def within(found: Spell, since_ns: int, until_ns: int) -> Spell:
 
 
 def _is_taken_over(edit: Edit, by: Edit) -> bool:
-    """Whether a trial's end is the other one's beginning: the same entry of the journal."""
+    """Return whether a trial's end is the other one's beginning: the same entry of the journal."""
     names = {change.name for change in by.changes}
     shares = any(change.name in names for change in edit.changes)
     return (
@@ -261,7 +261,7 @@ def _is_taken_over(edit: Edit, by: Edit) -> bool:
 
 
 def _instants(edit: Edit) -> Iterator[int]:
-    """When it changed what the robot does."""
+    """Yield when it changed what the robot does."""
     yield edit.began_ns if edit.in_force_ns is None else edit.in_force_ns
     if edit.ended_ns is not None:
         yield edit.ended_ns

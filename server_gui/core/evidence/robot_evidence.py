@@ -157,7 +157,7 @@ class RobotEvidence:
         return max(next(later, len(self._recordings)) - 1, 0)
 
     def _spell(self, edit: Edit) -> tuple[Spell, tuple[str, ...]]:
-        """When its old and new values were in force, in the recording that it was made in."""
+        """Return when its old and new values were in force, within the recording of the edit."""
         windows, notes = spell(edit, self._edits.all)
         place = self._place(edit)
         since_ns = self._recordings[place][0]

@@ -16,13 +16,13 @@ NO_UNITS: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 def changes(edit: Edit, units: Mapping[str, str] = NO_UNITS) -> str:
-    """Each parameter, what from and to; `units` are those that the values are in, by parameter."""
+    """Return each parameter, what from and to; `units` are those that the values are in, by parameter."""
     said = (f"{one.name} {from_to(one.old, one.new)} {units.get(one.name, '')}" for one in edit.changes)
     return ", ".join(one.rstrip() for one in said)
 
 
 def from_to(old: float | None, new: float | None) -> str:
-    """Both with as many decimal places: `0.40 → 0.43`."""
+    """Return both with as many decimal places: `0.40 → 0.43`."""
     texts = [number(old), number(new)]
     places = [len(text.partition(".")[2]) for text in texts]
     if old is not None and new is not None and all("e" not in text for text in texts):
@@ -40,7 +40,7 @@ def share(one: Measured) -> str:
 
 
 def _is_share(one: Measured) -> bool:
-    """Whether a percentage of what was before says something: not of next to nothing, nor of percents."""
+    """Return whether a percentage of the value before makes sense: not of almost nothing, or of percents."""
     ends = (abs(end or 0.0) for end in (one.difference, one.low, one.high))
     return bool(one.before) and one.unit != PERCENT and max(ends) <= MOST_SHARE * abs(one.before or 0.0)
 

@@ -201,7 +201,7 @@ def _check(info: ParameterInfo, unit: Unit, ways: list[tuple[float, float]], dwe
 
 
 def _nearest(info: ParameterInfo, value: float) -> float:
-    """As the device would hold it."""
+    """Return it as the device would hold it."""
     coding = coding_of(info.type, info.scale)
     try:
         return value if coding is None else float(coding.decode(coding.encode(value)))

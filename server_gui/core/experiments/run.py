@@ -141,7 +141,7 @@ class Run:
                 self._held = None if held is None else float(held)
 
     def beat(self) -> None:
-        """Somebody watches."""
+        """Note that somebody watches."""
         self._beat_ns = self._clock()
 
     def halt(self, why: str) -> None:
@@ -296,7 +296,7 @@ class Run:
         self._do(Event.UNREAD)
 
     def _ended(self) -> None:
-        """Nobody needs the lease any more; that it is given back is nothing that the end waits for."""
+        """Give the lease back, as nobody needs it any more; the end does not wait for that."""
         if self.state is not ExperimentState.NOTHING_DONE:
             self._commands.release_control()
 

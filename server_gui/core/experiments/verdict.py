@@ -32,7 +32,7 @@ class HeldPeriod:
     cycles: Sequence[Cycle]
 
     def of(self, leg: Leg) -> list[Cycle]:
-        """Those of one leg."""
+        """Return those of one leg."""
         return [cycle for cycle in self.cycles if cycle.leg is leg]
 
 

@@ -42,7 +42,7 @@ def minutes(seconds: float) -> str:
 
 
 def progress(run: Run) -> str:
-    """Where it stands, in a line."""
+    """Return its progress, in a line."""
     plan = run.plan
     what = f"{plan.kind.value} of {plan.name}"
     if run.state is ExperimentState.LOOKING:
@@ -64,7 +64,7 @@ def progress(run: Run) -> str:
 
 
 def ending(run: Run) -> str:
-    """How it has ended."""
+    """Return how it has ended."""
     early = f"ended early: {run.why}; " if run.why else ""
     back = f" ({run.back})" if run.back else ""
     return f"{early}{run.state.value}{back}"

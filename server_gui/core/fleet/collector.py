@@ -187,7 +187,7 @@ class Collector:
         return self._do(lambda: self._report(""))
 
     def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
-        """Another robot, from now on."""
+        """Follow another robot from now on."""
         return self._do(lambda: self._follow(robot, address))
 
     def leave(self, robot: str) -> "concurrent.futures.Future[None]":
@@ -241,7 +241,7 @@ class Collector:
             await self._fleet.run()
 
     def _wanted(self) -> bool:
-        """Whether the next batch may go to the store now."""
+        """Return whether the next batch may go to the store now."""
         match self._settings.recorder.upload:
             case Upload.ALWAYS:
                 return True
@@ -272,7 +272,7 @@ class Collector:
         return await self._on_disk(lost)
 
     async def _on_disk(self, lost: int) -> bool:
-        """Whether everything until now is safe, where so many rows had been lost before."""
+        """Return whether everything until now is safe, if so many rows had been lost before."""
         flushed = self._disk.submit(self._recorder.flush, ON_DISK_S)
         return await asyncio.wrap_future(flushed) and self._recorder.state.lost == lost
 

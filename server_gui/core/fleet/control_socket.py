@@ -92,7 +92,7 @@ def ask(folder: Path, what: str, text: str = "") -> bytes:
 
 
 def why_not_uploaded(folder: Path) -> str | None:
-    """Why the collector on this spool did not bring the newest batch that it tried into its store.
+    """Return why this spool's collector did not bring the newest batch that it tried into its store.
 
     Raises:
         NobodyCollects: as `ask`.

@@ -107,7 +107,7 @@ class Fleet:
                     self._following_tasks[robot] = group.create_task(member.run())
 
     def follow(self, robot: str, address: Address) -> None:
-        """Another robot, from now on."""
+        """Follow another robot from now on."""
         keeping = RobotRecording(robot, self._recorder, self._operator, self._notes, self._worn)
         if self.is_paused:
             keeping.pause()

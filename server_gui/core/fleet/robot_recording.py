@@ -96,7 +96,7 @@ class RobotRecording:
             self.session, self.began_s = self._recorder.begin(self._robot, found), time.time()
 
     def _lacks_parameters(self) -> bool:
-        """Whether a value is not known that the session began with: a busy robot tells some later."""
+        """Return whether a value of the session's beginning is unknown: a busy robot tells some later."""
         known = self._facts.parameters
         return not known or None in known.values()
 

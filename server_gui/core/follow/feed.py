@@ -231,7 +231,7 @@ class Feed:
             self._newest_entry = found.entries[-1]
 
     async def _identities(self, description: Description) -> None:
-        """Only what its EDS knows is asked of a device; one that cannot be asked costs no other."""
+        """Ask a device only for what its EDS knows; one that cannot be asked costs no other."""
         names = [part.name for part in description.components if isinstance(part.device, dict)]
         while True:
             await self._identify.wait()

@@ -81,6 +81,11 @@ class NodeHistory:
             self.is_told |= percent >= MANY_PERCENT or self._lasts(now_ns, places)
         return self.looks[places[-1]][1] if self.is_told else 0.0
 
+    def join(self, percent: float | None) -> float:
+        """Return the share of a look that is told at once, as another node of the bus is."""
+        self.is_told = bool(percent)
+        return percent or 0.0
+
     def _is_over(self, now_ns: int, newest: int) -> bool:
         fine = len(self.looks) - 1 - newest
         return fine >= ENDS_LOOKS and now_ns - self.looks[newest][0] >= ENDS_NS
@@ -113,7 +118,12 @@ class MissingPdos:
         return tuple(self._bus(bus, now_ns, (cpu_percent or 0.0) >= BUSY_PERCENT) for bus in buses)
 
     def _bus(self, bus: BusInfo, now_ns: int, is_busy: bool) -> BusInfo:
-        told = [self._nodes[bus.name, node.node_id].take(now_ns, _percent(node)) for node in bus.nodes]
+        known = [(self._nodes[bus.name, node.node_id], _percent(node)) for node in bus.nodes]
+        told = [history.take(now_ns, percent) for history, percent in known]
+        if any(told):  # it is the bus's trouble: nobody is told that others with as many are fine
+            told = [
+                found or history.join(percent) for found, (history, percent) in zip(told, known, strict=True)
+            ]
         is_busy = is_busy and len(told) > 1 and all(told)  # one alone has a cable of its own
         nodes = [
             node

@@ -138,7 +138,7 @@ class Robot:
         return self.resources.cpu.percent
 
     def age_s(self, now_ns: int | None = None) -> float | None:
-        """Seconds since the newest row was taken; None before the first."""
+        """Return seconds since the newest row was taken; None before the first."""
         if self._newest_ns is None:
             return None
         return max(0, (frame_time.now_ns() if now_ns is None else now_ns) - self._newest_ns) / 1e9
@@ -149,7 +149,7 @@ class Robot:
         return age_s is None or age_s * 1e9 > STALE_NS
 
     def rate_hz(self, now_ns: int | None = None) -> float:
-        """Rows a second over the last two seconds."""
+        """Return rows a second over the last two seconds."""
         now_ns = frame_time.now_ns() if now_ns is None else now_ns
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)

@@ -157,7 +157,7 @@ def batch(stream: int, given: Batch) -> None:
 
 
 def _are_numbers(values: Sequence[float | None]) -> bool:
-    """Whether each is finite or missing."""
+    """Return whether each is finite or missing."""
     with contextlib.suppress(TypeError, OverflowError):
         quickly = math.isfinite(sum(filter(None, values)))  # large ones may add up to what is not
         return quickly or all(value is None or math.isfinite(value) for value in values)

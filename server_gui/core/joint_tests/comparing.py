@@ -87,7 +87,7 @@ def _word(value: object) -> str:
 
 
 def told(shown: AnalysedTest, last: AnalysedTest | None) -> dict[str, Any]:
-    """All of it as plain values, for JSON."""
+    """Return all of it as plain values, for JSON."""
     before = None
     if last is not None:
         before = {

@@ -67,7 +67,7 @@ def friction(test: Test) -> JointTestResult:
 
 
 def _runs(test: Test) -> list[Run]:
-    """Where the target goes on evenly, its edges cut off."""
+    """Return the stretches in which the target goes on evenly, their edges cut off."""
     target, times, period = test["target"], test.times, test.head.period_s
     if len(target) < LEAST_SAMPLES or not np.isfinite(test["torque"]).all():
         return []

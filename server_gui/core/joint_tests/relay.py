@@ -59,7 +59,7 @@ def relay(test: Test) -> JointTestResult:
 
 
 def _rises(target: Samples) -> list[int]:
-    """Where the relay goes from pushing back to pushing forth."""
+    """Return where the relay goes from pushing back to pushing forth."""
     change = np.diff(target)
     most = float(np.max(np.abs(change))) if len(change) else 0.0
     return [int(at) + 1 for at in np.flatnonzero(change > most / 2.0)] if most else []

@@ -80,7 +80,7 @@ def measured(test: Test) -> Response | None:
 
 
 def _bandwidth(hz: Samples, magnitude: Samples, good: NDArray[np.bool_]) -> Measure:
-    """Where it is 3 dB below what it is at the lowest frequency, for the first time."""
+    """Return where it is first 3 dB below what it is at the lowest frequency."""
     fallen = np.flatnonzero(magnitude < magnitude[0] - 3.0)
     if not len(fallen):
         return unknown("bandwidth", "Hz", f"{NOT_REACHED}: above {hz[-1]:.1f} Hz")

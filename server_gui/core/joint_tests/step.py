@@ -74,7 +74,7 @@ def _one(times: Samples, target: Samples, position: Samples) -> dict[str, float]
 
 
 def _crossing(since: Samples, share: Samples, level: float) -> float:
-    """When it is there for the first time, between two samples."""
+    """Return when it is there for the first time, between two samples."""
     at = int(np.argmax(share >= level))
     if at == 0:
         return float(since[0])

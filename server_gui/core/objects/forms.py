@@ -41,7 +41,7 @@ _NUMBERED: Final = re.compile(r"0x([0-9A-Fa-f]{4}):(\d+)")
 
 
 def place(address: str) -> tuple[int, int]:
-    """Index and sub-index of `0x6041:0`; raises `ValueError` for what is no such address."""
+    """Return index and sub-index of `0x6041:0`; raises `ValueError` for what is no such address."""
     found = _NUMBERED.fullmatch(address)
     if found is None:
         raise ValueError(f"{address!r} is no object's address")
@@ -72,7 +72,7 @@ def bits_by_name(info: ObjectInfo, value: int) -> list[tuple[int, str, bool]]:
 
 
 def is_other(value: Number | str | None, other: Number | str | None) -> bool:
-    """Whether two values are known, and are not the same."""
+    """Return whether two values are known, and are not the same."""
     return value is not None and other is not None and value != other
 
 

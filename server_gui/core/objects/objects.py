@@ -103,7 +103,7 @@ class Objects:
 
 
 def _following(indices: list[int], first: int) -> int | None:
-    """Where to go on: at the last index, which may have more, unless it filled an answer alone."""
+    """Return where to go on: at the last index, which may have more, unless it filled an answer alone."""
     if not indices:
         return None
     last = indices[-1]

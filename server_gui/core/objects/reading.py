@@ -66,7 +66,7 @@ class Reading:
         self.left = dict.fromkeys(objects)
 
     def forget(self, *, values: bool) -> None:
-        """Another link, or another life of the robot's computer: then its values are those of before."""
+        """Forget the values of another link, or of another life of the robot's computer."""
         self.left.clear()
         self._asked.clear()
         self.problem = None

@@ -70,7 +70,7 @@ class Compared:
         return _value(self.held.get((self.with_component, info.object)))
 
     def differs(self, info: ObjectInfo) -> bool:
-        """Whether both are known, and are not the same."""
+        """Return whether both are known, and are not the same."""
         return is_other(self.value(info), self.other(info))
 
 
@@ -165,6 +165,6 @@ def _value(held: ReadValue | None) -> Number | str | None:
 
 
 def _text(info: ObjectInfo) -> str:
-    """All that words may be of."""
+    """Return all that words may be of."""
     parts = (info.object, info.name, info.type, info.access, info.unit, *info.pdos, info.parameter or "")
     return " ".join(parts)

@@ -31,7 +31,7 @@ class NewestPrediction:
         return self.predicted.prediction
 
     def age_s(self, now_ns: int | None = None) -> float:
-        """Seconds since the newest sample that it is about."""
+        """Return seconds since the newest sample that it is about."""
         waited_ns = (frame_time.now_ns() if now_ns is None else now_ns) - self.came_ns
         return max(0, waited_ns + (self.predicted.took_ns or 0)) / 1e9
 
@@ -72,7 +72,7 @@ class Recalled:
     old_s: float
 
     def age_s(self) -> float:
-        """Seconds since the newest sample that it is about."""
+        """Return seconds since the newest sample that it is about."""
         return self.old_s
 
     def is_stale(self) -> bool:

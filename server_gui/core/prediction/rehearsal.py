@@ -63,5 +63,5 @@ def _begins(rule: PredictionRule, predictions: Iterable[Prediction]) -> Iterable
 
 
 def _caused(at_ns: int, causes: Sequence[tuple[int, int]]) -> bool:
-    """Whether there was cause then, or so soon after it that a rule may warn of it."""
+    """Return whether there was cause then, or so soon after it that a rule may warn of it."""
     return any(begin_ns - LEAD_NS <= at_ns <= end_ns for begin_ns, end_ns in causes)

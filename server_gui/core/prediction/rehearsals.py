@@ -101,7 +101,7 @@ def of_sessions(
 
 
 def _of_session(rule: RuleSettings, replayed: Replayed, every_ns: int) -> Stretch:
-    """Where somebody has labelled it, there was cause while the rule's label was true."""
+    """Return the stretch of a session; if it is labelled, cause is while the rule's label was true."""
     causes = list(_causes(rule, replayed.truth)) if replayed.truth else None
     return Stretch(replayed.predictions, len(replayed.predictions) * every_ns, causes)
 

@@ -120,7 +120,7 @@ def _live(store: Store, session: Session, model: Model, found: Sequence[Predicti
 
 
 def _trust(model: Model, found: Sequence[Prediction], rows: Recorded) -> Trust:
-    """As it was shown at the session's end."""
+    """Return it as it was shown at the session's end."""
     trusting = Trusting(model.learned.recipe.channels, model.card.ranges)
     newest = np.searchsorted(rows.stamps_ns, [one.stamp_ns for one in found], side="right") - 1
     trusting.take(found, rows.values[newest])

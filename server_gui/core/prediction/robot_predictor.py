@@ -43,7 +43,7 @@ class Watched:
         return len(due) - len(self.due)
 
     def serve(self, model: Model) -> None:
-        """Another model from now on; what it looks back on is there where it looks at the same."""
+        """Serve another model from now on; what it looks back on is there if it looks at the same."""
         same = model.learned.recipe.name == self.model.learned.recipe.name
         self._trusting = Trusting(model.learned.recipe.channels, model.card.ranges)
         self.model = model
@@ -52,7 +52,7 @@ class Watched:
             self.restart()
 
     def restart(self) -> None:
-        """From now on nothing has been seen."""
+        """Forget everything seen until now."""
         self._windows = Windows(self.model.learned.recipe, self._every_ns)
 
     def predicted(
@@ -118,7 +118,7 @@ class RobotPredictor:
         return serves
 
     def restart(self) -> None:
-        """From now on nothing has been seen."""
+        """Forget everything seen until now."""
         for task in self.tasks.values():
             task.restart()
         if self._danger is not None:

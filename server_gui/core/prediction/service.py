@@ -122,7 +122,7 @@ class PredictionService:
         )
 
     def _powerless(self) -> Iterator[str]:
-        """Where a rule is to stop a robot, and may not by the model that serves."""
+        """Yield the rules that are to stop a robot, and may not by the model that serves."""
         for (robot, task), model in self._serving.models.items():
             for rule in self._stops(robot, task) if model.objection is not None else ():
                 yield f"{robot}: rule {rule.name} CANNOT STOP IT: {model.objection}"

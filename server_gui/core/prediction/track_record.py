@@ -139,7 +139,7 @@ class TrackRecord:
         return rows.sort_by("stamp_ns")
 
     def _classes(self, model: str, session: str) -> Sequence[str]:
-        """Those that the model knows; none where this session can prove nothing of it."""
+        """Return those that the model knows; none where this session can prove nothing of it."""
         try:
             card = self._registry.card(model)
         except UnusableModel:

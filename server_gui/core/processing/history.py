@@ -28,7 +28,7 @@ class Ring:
         self._count = min(self._count + 1, len(self._data))
 
     def rows(self) -> Floats:
-        """Rows in order, oldest first: time and numbers, NaN where one is not known. A copy."""
+        """Return rows in order, oldest first: time and numbers, NaN where one is not known. A copy."""
         if self._count < len(self._data):
             return self._data[: self._count].copy()
         return np.roll(self._data, -self._next, axis=0)

@@ -61,7 +61,7 @@ class _Way:
         self.restart()
 
     def restart(self) -> None:
-        """After a gap: what was seen before does not belong to what comes."""
+        """Restart after a gap: what was seen before does not belong to what comes."""
         self._seek = 0.0  # 1: the foot goes forward, −1: back, 0: not known yet
         self._extreme, self._extreme_ns, self._apart = 0.0, 0, 0.0
         self._before: float | None = None  # the extreme before, on the other end

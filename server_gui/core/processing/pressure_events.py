@@ -108,7 +108,7 @@ class PressureEvents:
         block[0], block[1] = min(block[0], force), max(block[1], force)
 
     def _find_again(self, force: float) -> None:
-        """Where drift has left the thresholds outside of what a stepping foot shows, follow the foot."""
+        """Follow the foot if drift has left the thresholds outside of what a stepping foot shows."""
         if len(self._blocks) < BLOCKS:
             return
         low, high = min(block[0] for block in self._blocks), max(block[1] for block in self._blocks)

@@ -28,7 +28,7 @@ class ProgramUse:
 
 
 def looks(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[float, Sequence[Mapping[str, Any]]]]:
-    """From rows of the store's table `resources`: when, in s of UTC, and the processes."""
+    """Yield looks from rows of the store's table `resources`: when, in s of UTC, and the processes."""
     for row in rows:
         yield row["utc"].timestamp(), row["processes"] or ()
 

@@ -77,7 +77,7 @@ def _split(channel: str) -> tuple[str, str, str]:
 
 
 def _place(channel: str, quantity: str) -> int:
-    """Where an angle that gait is seen by has its place; −1 for everything else."""
+    """Return the place of an angle that gait is seen by; −1 for everything else."""
     if quantity == TILT:
         return TRUNK
     return ANGLES.index(channel) if channel in ANGLES else -1

@@ -128,7 +128,7 @@ class Batching:
         return Record("events", fields)
 
     def _why_new(self, new: Notification) -> str | None:
-        """Why a connection begins with this, if one does."""
+        """Return why a connection begins with this, if one does."""
         if new.batch.link != self._link:
             return "the link was made again"
         if new.batch.seq <= self._newest.get(new.stream, (-1, 0, 1))[0]:

@@ -70,11 +70,11 @@ class Clock:
         self._anew = True  # and a session, before which UTC may have been anything
 
     def session(self) -> None:
-        """Another session begins: the next connection takes the clocks as they are."""
+        """Begin another session: the next connection takes the clocks as they are."""
         self._anew = True
 
     def connection(self) -> None:
-        """Another connection begins."""
+        """Begin another connection."""
         self._begins = True
 
     def take(self, stream: int, stamps_ns: Sequence[int], reading: ClockReading) -> int:
@@ -127,7 +127,7 @@ class Clock:
         return None if self._offset_ns is None else stamp_ns + self._offset_ns
 
     def _may_begin(self, first_ns: int, reading: ClockReading) -> bool:
-        """Whether a new connection may take the clocks as they are."""
+        """Return whether a new connection may take the clocks as they are."""
         before_ns = max((stamp_ns + offset_ns for stamp_ns, offset_ns in self._last.values()), default=0)
         goes_on = first_ns + reading.to_utc_ns - reading.robot_ns > before_ns
         return self._anew or goes_on or first_ns < self._newest_ns  # or it is another boot

@@ -57,7 +57,7 @@ class Columns:
         return field(name, pa.float64(), self._columns[name.lower()][1], known.channel)
 
     def _fits(self, name: str, unit: str | None, channel: str) -> bool:
-        """Whether values of this channel, in this unit, may stand in the column of this name."""
+        """Return whether values of this channel, in this unit, may stand in the column of this name."""
         if name.lower() in OWN or self._whose.get(name.lower(), channel) != channel:
             return False
         taken, known = self._columns.get(name.lower(), (name, None))

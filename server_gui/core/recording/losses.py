@@ -20,7 +20,7 @@ class Loss:
     times_ns: list[int] = field(default_factory=list)  # the first and the last
 
     def add(self, rows: int, times_ns: Iterable[int]) -> None:
-        """So many more, of these times."""
+        """Add so many more, of these times."""
         found = [*self.times_ns, *times_ns]
         self.rows += rows
         self.times_ns = [min(found), max(found)] if found else []
@@ -49,7 +49,7 @@ class Losses:
                 self._found[robot][part.table].add(1, [utc_ns] if isinstance(utc_ns, int) else [])
 
     def count(self, robot: str, rows: int, utc_ns: int) -> None:
-        """So many of this robot, at about that time; nobody has looked of which table."""
+        """Count so many of this robot, at about that time; nobody has looked of which table."""
         if rows:
             self._found[robot][_ANY].add(rows, [utc_ns])
 

@@ -257,7 +257,7 @@ def _stated(line: bytes) -> int:
 
 
 def _tail(descriptor: int) -> tuple[int, list[bytes]]:
-    """Up to where the file has whole lines, and the last of them; before the first one stands b""."""
+    """Return up to where the file has whole lines, and the last of them; before the first one stands b""."""
     size = os.fstat(descriptor).st_size
     begin, rest = size, b""
     lines: list[bytes] = []

@@ -412,7 +412,7 @@ class Recorder:
         self._break(error)
 
     def _count(self, lost: Iterable[tuple[str, int]]) -> None:
-        """So many rows of each robot are lost, and nobody knows more of them."""
+        """Count so many lost rows of each robot, of which nobody knows more."""
         now_ns = Moment.now().utc_ns
         for robot, rows in lost:
             self._lost += rows
@@ -424,7 +424,7 @@ class Recorder:
         self._write_again()
 
     def _write_again(self) -> None:
-        """After a loss: what may have been among it, and what is said once."""
+        """Write again after a loss what may have been among it, and what is said once."""
         self._sessions_lost = True
         self._robots.heads = dict(self._spool.heads)  # those entries are still to be seen
 
@@ -462,7 +462,7 @@ class Recorder:
         if text is None:
             if known is not None:
                 del self._alarms[kind]
-                log.warning("over: %s", known.text)
+                log.warning("no longer: %s", known.text)
             return
         self._alarms[kind] = Alarm(kind, text)
         if known is None:

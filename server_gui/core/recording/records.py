@@ -53,7 +53,7 @@ class Session(msgspec.Struct, frozen=True):
     ended_utc_ns: int | None = None
 
     def record(self) -> Record:
-        """As a row of the table `sessions`."""
+        """Return it as a row of the table `sessions`."""
         facts = self.facts
         fields = {
             "robot": self.robot,

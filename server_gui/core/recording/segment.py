@@ -299,7 +299,7 @@ class Segment:
         self._damaged = damaged
 
     def _sound(self, line: tuple[Any, ...]) -> bool:
-        """Whether a run is as it was written, as far as anybody knows."""
+        """Return whether a run is as it was written, as far as anybody knows."""
         data, crc = line[DATA], line[DATA + 1]
         if not isinstance(data, bytes):
             return False
@@ -351,7 +351,7 @@ class Segment:
         return {entry["robot"]: JournalHead(entry["n"], entry["hash"]) for entry in entries} | found
 
     def _heads(self) -> tuple[dict[str, JournalHead], bool]:
-        """Those that are as they were written, and whether these are all."""
+        """Return those that are as they were written, and whether these are all."""
         with translated(self.path):
             lines = self._database.execute("SELECT robot, n, hash, crc FROM journal_head").fetchall()
         told = [(robot, JournalHead(n, digest), crc) for robot, n, digest, crc in lines]

@@ -112,7 +112,7 @@ class Files:
         durable.sync(self.folder)
 
     def keep_damaged_logs(self) -> None:
-        """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
+        """Keep damaged logs before SQLite reads them up to the damage and forgets the rest."""
         for number in self.all_of(SegmentState.WAITING):
             log_ = self.path(number).with_name(f"{self.path(number).name}-wal")
             if lost_commits(log_, PAGE_BYTES) and number not in self.all_of(SegmentState.CUT):

@@ -125,7 +125,7 @@ def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int,
 
 
 def _is_retained(spool: Spool, store: Store, writer: str, number: int) -> bool:
-    """Whether such events were removed because they were old."""
+    """Return whether such events were removed because they were old."""
     until = upkeep.retained(store, EVENTS.name)
     sent = (each for each in spool.receipts.whole() if (each.writer, each.batch) == (writer, number))
     ends_us = [part.end_us for each in sent for part in each.parts if part.end_us is not None]

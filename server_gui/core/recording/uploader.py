@@ -100,7 +100,7 @@ class Uploader:
         return True
 
     def hurry(self) -> None:
-        """Nobody waits for a `drain` any more, from any thread: what is in the spool stays there."""
+        """End the wait for a `drain`, from any thread: what is in the spool stays there."""
         self._hurries.set()
         self._turned.set()
 

@@ -77,7 +77,7 @@ def _lost(log: BinaryIO, page_bytes: int) -> list[_Place]:
 
 
 def _was_synchronised(log: Path, commit: _Place) -> bool:
-    """Whether the log's index, as it was left, knows this commit."""
+    """Return whether the log's index, as it was left, knows this commit."""
     try:
         headers = log.with_name(f"{log.name.removesuffix('-wal')}-shm").read_bytes()[: 2 * INDEX.size]
     except FileNotFoundError:
@@ -94,7 +94,7 @@ def _knows(header: bytes, commit: _Place) -> bool:
 
 
 def _alike(one: Pair, other: Pair) -> bool:
-    """Whether they are of one log, as far as damage lets tell: an earlier log has both of them different."""
+    """Return whether they are of one log, as far as damage shows: in an earlier log both differ."""
     return one[0] == other[0] or one[1] == other[1]
 
 

@@ -81,7 +81,7 @@ def _write(written: Path, text: str, like: Path) -> None:
 
 
 def _check(written: Path) -> None:
-    """Whether the server could begin with it."""
+    """Check that the server could begin with it."""
     try:
         load(written)
     except SettingsError as error:

@@ -30,7 +30,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
         _refuse(_strange("every_ms", self.every_ms, CLASSES))
 
     def every_ns(self, task: str) -> int:
-        """Between two decisions of a task."""
+        """Return the time between two decisions of a task."""
         return self.every_ms.get(task, EVERY_MS[task]) * 1_000_000
 
 
@@ -54,7 +54,7 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
     for_ms: Annotated[int, Meta(ge=0, le=60_000)] = 0  # time above the threshold
     release: Annotated[float, Meta(ge=0, le=1)] | None = None  # None: four fifths of `at_least`
     robot: str = "*"  # a name or glob
-    action: Action = Action.ALARM  # "stop" also stops every drive of the robot
+    action: Action = Action.ALARM  # "stop" also stops every drive of the robot, by models of `[promoters]`
 
     def __post_init__(self) -> None:
         classes = {**{task: (*labels, ABNORMAL) for task, labels in CLASSES.items()}, DANGER: DANGER_LEVELS}

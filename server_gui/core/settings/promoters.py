@@ -36,7 +36,7 @@ def own_line() -> tuple[str, str]:
 def objection(
     pointer: Pointer | None, task: str, robot: str, card: Card, known: Mapping[str, str]
 ) -> str | None:
-    """Why no rule may stop a robot by what serves; `None` where one of these has promoted this very model.
+    """Return why no rule may stop a robot by what serves; `None` if one of these promoted this very model.
 
     `known` are the fingerprints of their keys by name, `robot` is "" where it serves every robot.
     """

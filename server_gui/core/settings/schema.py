@@ -7,7 +7,7 @@ from server_gui.core.settings.server_file import RecordingSettings, RobotSetting
 
 
 def schema() -> Schema:
-    """All of it."""
+    """Return all of it."""
     defs = definitions([RobotSettings, StoreSettings, RecordingSettings, PredictionSettings, RuleSettings])
     rule = defs[RuleSettings.__name__]["properties"]
     rule["task"]["enum"] = list(CLASSES)

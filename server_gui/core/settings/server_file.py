@@ -55,12 +55,12 @@ class Upload(Enum):
 
 
 def default_file() -> Path:
-    """Under the user's own configuration (XDG base directories)."""
+    """Return the file below the user's own configuration (XDG base directories)."""
     return _user_folder("XDG_CONFIG_HOME", ".config") / "server.toml"
 
 
 def default_spool() -> Path:
-    """Under the user's own data (XDG base directories)."""
+    """Return the folder below the user's own data (XDG base directories)."""
     return _user_folder("XDG_DATA_HOME", ".local/share") / "spool"
 
 

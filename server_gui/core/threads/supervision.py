@@ -125,7 +125,7 @@ class ThreadWatch:
         self._known: dict[str, Trouble] = {}
 
     def add(self, worker: Worker) -> None:
-        """Another one, from now on."""
+        """Watch another one from now on."""
         with self._lock:
             self._workers += (worker,)
 
@@ -137,6 +137,6 @@ class ThreadWatch:
                 if self._known.get(name) != trouble:
                     log.error("%s", trouble.text)
             for name in self._known.keys() - found.keys():
-                log.warning("over: %s", self._known[name].text)
+                log.warning("no longer: %s", self._known[name].text)
             self._known = found
             return tuple(found.values())

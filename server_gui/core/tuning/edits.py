@@ -108,7 +108,7 @@ def unit_of(name: str, si: str, units: Units) -> Unit:
 
 
 def refusal(value: float, old: Number | None, info: ParameterInfo | None, unit: Unit) -> str | None:
-    """Why a robot would refuse this value (SI), in words and `unit`; None where nothing speaks against it."""
+    """Return why a robot would refuse this value (SI), in words and `unit`; None if nothing is against it."""
     if info is None:
         return "the robot has no such parameter any more"
     broken = broken_limit(info, coding_of(info.type, info.scale), value, old)

@@ -48,7 +48,7 @@ class _Reading:
         self._writes: dict[Any, Mapping[str, Number]] = {}  # write → what it wrote
 
     def begun(self, entry: Entry) -> None:
-        """From now on nobody knows, until the journal says how it ended."""
+        """Note that nobody knows from now on, until the journal says how it ended."""
         after = entry.get("after")
         self._writes[entry.get("write")] = after if isinstance(after, Mapping) else {}
         self._forget(self._writes[entry.get("write")])

@@ -16,7 +16,7 @@ class LeaseState:
     problem: str | None = None  # why we do not have it, in the robot's words
 
     def left_s(self, now_ns: int | None = None) -> float | None:
-        """Seconds that are left, None where we do not hold it."""
+        """Return seconds that are left, None where we do not hold it."""
         if self.until_ns is None:
             return None
         left_ns = self.until_ns - (frame_time.now_ns() if now_ns is None else now_ns)
@@ -35,7 +35,7 @@ class LeaseState:
         self.taken(Lease("", ttl_s))
 
     def refused(self, why: str) -> None:
-        """Somebody else has it, or nobody answered."""
+        """Note that somebody else has it, or nobody answered."""
         self.asking, self.problem = False, why
 
     def gone(self) -> None:

@@ -57,7 +57,7 @@ def _offers(name: str, value: Number, description: Description, held: Held, unit
 
 
 def _held(names: Mapping[str, Number], description: Description, held: Held, units: Units) -> str:
-    """Each with its value now, so that nobody levels out what was meant to differ."""
+    """Return each with its value now, so that nobody levels out what was meant to differ."""
     si = {one.name: one.unit for one in description.parameters}
     said = []
     for name in names:

@@ -129,7 +129,7 @@ class StopProgress:
             self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
 
     def failed(self, number: int, reason: str) -> None:
-        """Nobody answered: consider the robot not stopped."""
+        """Note that nobody answered: consider the robot not stopped."""
         if number == self.number:
             self._not_confirmed(reason)
 
@@ -216,10 +216,9 @@ class StopProgress:
         return max([1.0, *(proof.after_ms for proof in self.proofs.values())])
 
     def timed(self, confirmed: str) -> str:
-        """Return the confirmation with its time; if rows show an earlier stop, with when its answer came."""
-        answered = f"{self.answered_ms or 0:.0f} ms"
-        is_late = set(self.proofs) >= set(self._confirmed) and f"{self._slowest_ms:.0f} ms" != answered
-        return f"{confirmed}, answer after {answered}" if is_late else f"{confirmed} in {answered}"
+        """Return the confirmation with its time: the slowest drive's, or the answer's if rows lack one."""
+        is_shown = self._confirmed and set(self.proofs) >= set(self._confirmed)
+        return f"{confirmed} in {self._slowest_ms if is_shown else self.answered_ms or 0:.0f} ms"
 
     @property
     def proof(self) -> str:

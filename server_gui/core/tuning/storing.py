@@ -48,7 +48,7 @@ def storable(description: Description) -> list[Storable]:
 
 
 def objection(device: Storable, robot: Robot, trial: Trial | None) -> str | None:
-    """Why the robot would refuse to store it now, as far as that is known here."""
+    """Return why the robot would refuse to store it now, as far as that is known here."""
     if trial is not None:
         return f"{', '.join(trial.values)} is on trial: keep it or take it back first"
     joints = robot.names("joint")

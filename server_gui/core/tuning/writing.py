@@ -43,7 +43,7 @@ class Trial:
     until_ns: int
 
     def left_s(self, now_ns: int | None = None) -> float:
-        """Seconds until it reverts, never below 0."""
+        """Return seconds until it reverts, never below 0."""
         return max(0, self.until_ns - (frame_time.now_ns() if now_ns is None else now_ns)) / 1e9
 
 

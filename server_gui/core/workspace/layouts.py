@@ -262,7 +262,7 @@ def _trigger_problem(trigger: TriggerLayout) -> str:
 
 
 def curve_problem(curve: str) -> str:
-    """Why this can be no curve of any robot; empty where it can."""
+    """Return why this can be no curve of any robot; empty if it can."""
     if not curve.isprintable() or len(curve) > LONGEST:
         return f"a curve is written in at most {LONGEST} letters, without breaks"
     try:

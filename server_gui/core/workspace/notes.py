@@ -22,7 +22,7 @@ class Notes(Protocol):
         ...
 
     def flags(self) -> Sequence[Flag]:
-        """Those that are no flags of the robot anyway."""
+        """Return those that are no flags of the robot anyway."""
         ...
 
 

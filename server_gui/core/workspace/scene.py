@@ -119,7 +119,7 @@ class Scene:
         return [self.unit(place) for place in range(len(self.workspace.plots))]
 
     def drawn(self, text: str, unit: Unit | None) -> str:
-        """Why a curve of a plot in this unit is not drawn; empty where it is."""
+        """Return why a curve of a plot in this unit is not drawn; empty if it is."""
         meant = self.meaning(text)
         if meant.problem:
             return meant.problem
@@ -139,7 +139,7 @@ class Scene:
         return np.full(rows, np.nan) if column is None else column[len(column) - rows :]
 
     def values_beside(self, text: str, times: Floats) -> Floats:
-        """Those of what is beside it, at these times; not to be kept."""
+        """Return those of what is beside it, at these times; not to be kept."""
         if self.frozen is not None:
             return self.values(f"{BESIDE_KEY}{text}", len(times))
         meant = self.meaning_beside(text)
@@ -238,14 +238,14 @@ class Scene:
             self.frozen = None
 
     def trigger_text(self) -> str:
-        """How the trigger is, in words; empty where there is none."""
+        """Return the trigger's state, in words; empty if there is none."""
         if self.trigger.state is TriggerState.OFF:
             return ""
         problem = self.trigger_problem(self.trigger.condition)
         return f"cannot trigger: {problem}" if problem else self.trigger.text(self._newest_s())
 
     def trigger_problem(self, condition: Condition) -> str:
-        """Why this cannot trigger on this robot; empty where it can."""
+        """Return why this cannot trigger on this robot; empty if it can."""
         if condition.problem:
             return condition.problem
         if condition.on is On.EMCY:
@@ -260,7 +260,7 @@ class Scene:
         return [part for part in parts if self._errors(part) is not None]
 
     def trigger_flag(self) -> Flag | None:
-        """Where it has triggered, as a flag."""
+        """Return the instant at which it has triggered, as a flag."""
         kept = self.frozen
         if kept is None or kept.trigger_ns is None:
             return None
@@ -310,6 +310,8 @@ class Scene:
         """Return the companion's name, and the alignment of both."""
         if self.beside is None or self._station is None:
             return ""
+        if self._station.robot.is_recording and self.beside.station.robot.is_recording:
+            return f"┅ {self.beside.station.title}, played together"  # by what, stands where it is chosen
         said = offset_text(self._station, self.beside.station, self._shift_ns, self.nudge_s)
         by = "their clocks" if self.align is Align.NOW else self.align.value
         return f"┅ {self.beside.station.title}, aligned by {by}: {said}"

@@ -109,7 +109,7 @@ class Trigger:
             self._wait(None)
 
     def shows_live(self, newest_s: float) -> bool:
-        """Whether to show what comes, for want of anything better."""
+        """Return whether to show what comes, for want of anything better."""
         if self.state is TriggerState.OFF:
             return True
         if self.state is not TriggerState.ARMED:
@@ -158,7 +158,7 @@ class Trigger:
         )
 
     def text(self, newest_s: float | None) -> str:
-        """How it is, in words; times are s until the newest row."""
+        """Return its state, in words; times are s until the newest row."""
         if self.at_s is None or newest_s is None:
             return (
                 f"{self.state.value}: waits for {self.condition.of}"

@@ -53,7 +53,7 @@ class Workspace:
         self.show(list(by_unit.values()))
 
     def show(self, plots: Sequence[PlotSpec]) -> None:
-        """Have exactly these."""
+        """Show exactly these."""
         self.plots = [PlotSpec(list(plot.curves), plot.x) for plot in plots]
         self.revision += 1
 

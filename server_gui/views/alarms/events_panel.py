@@ -23,6 +23,7 @@ from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.core.alarms.severity import event_mark
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.recording import WHO
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
 from server_gui.views.theme import Theme
@@ -72,7 +73,8 @@ class NewsModel(QAbstractTableModel):
 
     def refresh(self) -> None:
         """Take what is new."""
-        revision = (self._desk.news.revision, *(one.alarms.revision for one in self._desk.stations))
+        alarms = (self._desk.recording.alarms, *(one.alarms for one in self._desk.stations))
+        revision = (self._desk.news.revision, *(one.revision for one in alarms))
         if revision != self._revision:
             self._revision = revision
             self._take()
@@ -83,7 +85,12 @@ class NewsModel(QAbstractTableModel):
         self._take()
 
     def _take(self) -> None:
-        active = [_of_alarm(station, one) for station in self._desk.stations for one in station.alarms.active]
+        found: list[tuple[Station | None, Active]] = [
+            (None, one) for one in self._desk.recording.alarms.active
+        ]
+        found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
+        found.sort(key=lambda told: told[1].alarm.rank)  # worst first: few are in sight
+        active = [_of_alarm(*told) for told in found]
         alarms = {one.title: one.alarms for one in self._desk.stations}
         news = (
             _of_item(item, event_mark(item, alarms.get(item.robot)))
@@ -220,13 +227,14 @@ class EventsPanel(QWidget):
         self.table.setMinimumHeight(self._theme.px(40))
 
 
-def _of_alarm(station: Station, one: Active) -> EventRow:
+def _of_alarm(station: Station | None, one: Active) -> EventRow:
     alarm = one.alarm
     where = alarm.where or alarm.subject.replace("_", " ")
     text = ": ".join(filter(None, (where, alarm.what)))
-    known = alarm.channel is not None and one.at_ns is not None
-    at = (station, str(alarm.channel), one.at_ns or 0) if known else None
-    return EventRow(f"since {_clock(one.since_s)}", alarm.mark, station.title, text, at)
+    known = station is not None and alarm.channel is not None and one.at_ns is not None
+    at = (station, str(alarm.channel), one.at_ns or 0) if station is not None and known else None
+    who = WHO if station is None else station.title
+    return EventRow(f"since {_clock(one.since_s)}", alarm.mark, who, text, at)
 
 
 def _of_item(item: Item, mark: Mark) -> EventRow:

@@ -157,7 +157,7 @@ class AlarmRow(QFrame):
 
 
 def _high(label: WrappingLabel, text: str) -> int:
-    """How high a label is with this text."""
+    """Return the height of a label with this text."""
     box = QRect(0, 0, max(label.width(), 1), MOST_PX)
     return label.fontMetrics().boundingRect(box, WRAPPED, text).height()
 

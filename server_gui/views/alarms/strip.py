@@ -179,7 +179,7 @@ class AlarmStrip(ClickableFrame):
         set_tone(self, mark.colour)
         self.setAccessibleDescription("; ".join(filter(None, (wordings[0], fuller[0]))))
         set_tip(self, "\n".join(filter(None, (wordings[0], fuller[0]))) if first is not None else "")
-        said_now = (wordings, fuller, self._words.viewport().size(), self.headline.font().key())
+        said_now = (wordings, fuller, self._words.room, self.headline.font().key())
         if said_now != self._said:
             self._said = said_now
             self._fit(wordings, fuller)
@@ -194,7 +194,7 @@ class AlarmStrip(ClickableFrame):
         return going_on(told, worse[1].alarm, named=self.named)
 
     def _fit(self, wordings: tuple[str, ...], fuller: tuple[str, ...]) -> None:
-        room = self._words.viewport().size()
+        room = self._words.room
 
         def high(label: WrappingLabel, text: str) -> int:
             box = QRect(0, 0, max(room.width(), 1), 100_000)
@@ -264,6 +264,11 @@ class _Words(QScrollArea):
 
     def sizeHint(self) -> QSize:
         return QSize(1, 1)
+
+    @property
+    def room(self) -> QSize:
+        """Room for text, whether a scroll bar is beside it or not: what fits must not turn on that."""
+        return self.size() - QSize(self.verticalScrollBar().sizeHint().width(), 0)
 
 
 def set_button(button: QPushButton, text: str) -> None:

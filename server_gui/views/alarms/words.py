@@ -14,7 +14,7 @@ from server_gui.views.marks import Mark
 
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
-BUSY: Final = "this computer is busy, what it shows may be late: end other programs on it"
+BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -39,7 +39,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     if recording is not None and recording.can_ask and not recording.reach.is_known:
         return Mark("ring", "dim"), "No alarms", "the store is not known"
     if station.is_full():
-        return Mark("triangle", "warn", "busy"), "No alarms", BUSY
+        return Mark("triangle", "warn", "busy"), "This computer is busy", BUSY
     return Mark("disc", "good"), "No alarms", "all ok"
 
 
@@ -60,7 +60,7 @@ def going_on(told: Told, worse: Alarm, *, named: bool) -> tuple[str, ...]:
     station, one = told
     where = f"{worse.mark.word}: {worse.spoken}" if worse.spoken else worse.mark.word
     whose = f"{station.title} · " if station and named else ""
-    first = f"{whose}{one.alarm.mark.word}: enable the drives to go on"
+    first = f"{whose}{one.alarm.mark.word}: nothing moves until the drives are enabled"
     last = "" if worse.is_now else " (last known)"
     return tuple(f"{first} · also {also}{last}" for also in dict.fromkeys((worse.line, where)))
 

@@ -85,7 +85,7 @@ def _number(line: ActRow, value: Number | None) -> str:
 
 
 def _tip(line: ActRow) -> str:
-    """Every digit, and where it stands in the journal."""
+    """Return every digit, and where it stands in the journal."""
     act, unit = line.act, line.unit
     known = {"old": act.old, "new": act.new, "read back": act.read_back}
     values = (

@@ -152,7 +152,7 @@ class Form(Card):
 
 
 def _words(text: str) -> list[str]:
-    """As a shell parts them; what it cannot part is parted at its spaces."""
+    """Return it as a shell parts them; what it cannot part is parted at its spaces."""
     try:
         return shlex.split(text)
     except ValueError:

@@ -75,7 +75,7 @@ class CommissionPage(QWidget):
         self._columns.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """While a joint is under power, Return is a STOP as it is in a terminal."""
+        """Take Return for a STOP while a joint is under power, as in a terminal."""
         keys = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape)
         if event.key() in keys and self.commissioning.stage is Stage.MOVING:
             self.commissioning.stop()

@@ -103,7 +103,7 @@ def _state(steps: list[StepMessage]) -> str:
 
 
 def _told(steps: list[StepMessage]) -> str:
-    """Every step of the part that is gone through; of another one what is not as its mark says."""
+    """Return every step of the part that is gone through; of another one what is not as its mark says."""
     state = _state(steps)
     if state == NOW:
         return "\n".join(f"{_glyph(one.state)} {one.title}" for one in steps)

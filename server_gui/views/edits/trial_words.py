@@ -63,7 +63,7 @@ def so_far(station: Station) -> tuple[str, ...]:
 
 
 def _not_enough(evidence: Evidence) -> str:
-    """Whether it is too early, or what keeps strides from being counted."""
+    """Return that it is too early, or what keeps strides from being counted."""
     before, after = evidence.cycles_before, evidence.cycles_after
     if min(before, after) >= 2 * FEWEST:
         most = sorted(evidence.left_out.items(), key=operator.itemgetter(1), reverse=True)

@@ -173,7 +173,7 @@ class ExperimentForm(QDialog):
         return info, float(held.value), unit_of(name, info.unit, self._desk.shown.units)
 
     def _chosen(self) -> None:
-        """Another parameter: begin with what was on trial; else with what is held, and was typed for it."""
+        """Begin another parameter with what was on trial; else with what is held, and was typed for it."""
         tried = self._tried
         is_ab = self._kind is ExperimentKind.AB  # a sweep begins with what is held
         if tried is not None and is_ab and tried.parameter == self.parameter.currentText():

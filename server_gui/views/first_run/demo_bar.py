@@ -28,7 +28,7 @@ WALKS: Final = "Tells the simulated controller to start and the wearer to walk, 
 
 
 def walks(station: Station) -> bool:
-    """Whether there is nothing to start: its wearer walks, and every drive is enabled, as far as is known."""
+    """Return whether nothing is left to start: its wearer walks, and every drive is enabled."""
     robot = station.robot
     words = {robot.word(f"{joint}.state") for joint in robot.names("joint")}
     return station.is_live and bool(station.processing.derived().gait.walking) and words == {ENABLED}

@@ -54,7 +54,7 @@ def fill(menu: QMenu, listed: Listed, chosen: Callable[[str, str], None]) -> Non
 
 
 def _entries(group: QMenu, name: str, kind: FaultKind) -> Iterator[tuple[QMenu, str, str]]:
-    """Where an entry stands, its device, and its words: a menu of devices where there are several."""
+    """Yield each entry's menu, device and words: a menu of devices if there are several."""
     if len(kind.on) == 1:
         yield group, kind.on[0], words(name)
         return

@@ -113,7 +113,7 @@ class Tour(QWidget):
         self.hide()
 
     def begin(self) -> None:
-        """From the first stop on."""
+        """Begin from the first stop."""
         self.show()
         self.go(0)
 

@@ -177,7 +177,7 @@ class Docks(QObject):
 
 
 def _room() -> QScrollArea:
-    """For a panel, which may need more than there is."""
+    """Return a scroll area for a panel, which may need more than there is."""
     area = QScrollArea()
     area.setWidgetResizable(True)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -170,7 +170,7 @@ def _outcome(station: Station) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (stopping.timed(f"{stopping.drives} drives"),),
-        StopState.NOT_CONFIRMED: (remedy(station.robot),),
+        StopState.NOT_CONFIRMED: (remedy(station.robot).partition(",")[0],),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
@@ -179,7 +179,7 @@ def _robot(station: Station) -> Words:
     description, mark = station.robot.description, station.mark
     parts = [mark.word]
     if station.is_named and station.called != station.title:
-        parts.append(station.called)
+        parts.append(f"calls itself {station.called}")
     parts.append(station.address)
     parts += [] if description is None else [description.role]
     parts += [f"you are {station.who}"] if station.who else []

@@ -197,7 +197,7 @@ class MainWindow(QMainWindow):
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
 
     def _is_due(self) -> bool:
-        """Whether what is read now and then is: at once where that is about something else.
+        """Return whether occasional readings are due: at once if they are about something else.
 
         Another robot is named, a STOP goes on, or its wearer does something else, as the ring shows at once.
         """
@@ -335,7 +335,7 @@ class MainWindow(QMainWindow):
         self._panels.fit(scaled=scaled)
 
     def _hold_header(self) -> None:
-        """Never narrower than the header, which Qt does not see to, nor larger than the screen."""
+        """Keep it as wide as the header, which Qt does not see to, and no larger than the screen."""
         needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
         self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 

@@ -58,7 +58,7 @@ class PageBar(QWidget):
                 button.style().polish(button)
 
     def arrange(self) -> None:
-        """From left to right; what has no room beside the corner begins another row."""
+        """Arrange from left to right; what has no room beside the corner begins another row."""
         corner = self._corner.sizeHint()
         self._tighten(self.width() - corner.width())
         high = max(corner.height(), *(button.sizeHint().height() for button in self.buttons))

@@ -29,7 +29,7 @@ EMPTY: Final = (
 )
 
 
-AWAY: Final = "▲ The store is not reached; retrying; models promoted there are not shown: {why}"
+AWAY: Final = "▲ The store is not reached; retrying. Below is what was known before: {why}"
 
 
 class ModelsPage(QWidget):
@@ -196,7 +196,8 @@ class ModelsPage(QWidget):
 
     def _show_actions(self, entry: Entry | None) -> None:
         asked = self._models.change is not None
+        is_reached = self._models.reach.problem is None
         for button in (self.promote, self.back):
-            button.setEnabled(entry is not None and not asked)
+            button.setEnabled(entry is not None and not asked and is_reached)
         training_now = " · training" if self._models.is_training else ""
         self._list.set_note(f"{len(self._models.found.entries)} models{training_now}")

@@ -84,7 +84,7 @@ class ChoiceBar(QWidget):
         _set_text(self.all, READ_NO_MORE if is_reading else READ_ALL)
 
     def arrange(self, room: int) -> int:
-        """Stand beside each other as far as there is room; how many buttons that are."""
+        """Arrange beside each other as far as there is room; return how many buttons that are."""
         found = room // self._theme.px(BUTTON)
         columns = next((evenly for evenly in EVENLY if evenly <= found), 1)
         if columns != self._columns:

@@ -61,7 +61,7 @@ class FactsCard(Card):
         self._restyle()
 
     def arrange(self, columns: int) -> None:
-        """Stand so many buttons in a row, at most."""
+        """Arrange so many buttons in a row, at most."""
         columns = min(columns, len(self.buttons))
         if columns == self._columns:
             return

@@ -49,7 +49,7 @@ class ShownObjects:
         return self.compared.held.get((self.compared.component, info.object))
 
     def is_now(self, held: ReadValue) -> bool:
-        """Whether it may be called how it is."""
+        """Return whether it may be called the present value."""
         return self.is_linked and not held.is_old(now_ns())
 
 

@@ -172,7 +172,7 @@ class ObjectsPage(QWidget):
             self.look()
 
     def _edit(self) -> None:
-        """Where it is a parameter that may be changed here, stage it where parameters are staged."""
+        """Stage it with the other parameters, if it is one that may be changed here."""
         station, current = self._desk.selected, self.table.current
         if station is None or current is None or current.parameter is None:
             return
@@ -243,7 +243,7 @@ class ObjectsPage(QWidget):
         self.facts.show_object(info, compared.component, said, refused)
 
     def _refused(self, station: Station, info: ObjectInfo) -> str:
-        """Why it cannot be changed here; empty where it can."""
+        """Return why it cannot be changed here; empty if it can."""
         if info.read_only is not None or info.parameter not in station.known:
             return info.locked or info.read_only or "it is not a parameter that may be changed"
         return station.refused(PARAMETER_WRITE)

@@ -382,7 +382,7 @@ def _text(unit: Unit, quantity: str, value: float | None) -> str:
 
 
 def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
-    """Where it is, where it should be, and how far that is apart."""
+    """Return where it is, where it should be, and how far that is apart."""
     unit = _unit(desk, "position")
     position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
     text = f"{_text(unit, 'position', position)} / {_text(unit, 'position', target)}"
@@ -397,7 +397,7 @@ def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
 
 
 def _target(station: Station, joint: str) -> float | None:
-    """Where the drive tells no target, it is its position and its following error."""
+    """Return the target; if the drive tells none, its position plus its following error."""
     values = station.robot.values
     position, error = values.get(f"{joint}.position"), values.get(f"{joint}.following_error")
     told = values.get(f"{joint}.target_position")

@@ -144,7 +144,7 @@ class KeyPlot(Card):
         return list(dict.fromkeys([*held, *self._guarded(station)]))
 
     def _guarded(self, station: Station) -> list[float]:
-        """Where a rule of the guard trips."""
+        """Return where a rule of the guard trips."""
         rules = () if station.robot.description is None else station.robot.description.guard.rules
         ends = [
             (rule.low, rule.high)

@@ -112,7 +112,7 @@ class NowLine(QFrame):
         self._fit(on_trial=self._placed[1])
 
     def offer(self, wanted: bool) -> None:
-        """Whether what is on trial is judged, kept or taken back here: not where its panel is in sight."""
+        """Choose whether a trial is judged, kept or taken back here: not while its panel is in sight."""
         self._is_offered = wanted
         self._decide.setVisible(wanted and self._placed[1])
 

@@ -101,7 +101,7 @@ class Overview(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
-        self._columns, self._is_plots, self._is_low = 0, False, False
+        self._columns, self._is_plots, self._is_low, self._low_in = 0, False, False, QSize()
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -116,10 +116,13 @@ class Overview(QWidget):
             self._arrange(columns)
 
     def _is_too_low(self) -> bool:
-        """Whether something has to be scrolled to."""
+        """Return whether something has to be scrolled to; once so, while the room for it stays."""
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return False
+        if self._is_low and seen.size() == self._low_in:  # words that come and go move nothing
+            return True
+        self._low_in = seen.size()
         spare = seen.height() - self._grid.totalMinimumSize().height()
         return spare < (self._theme.px(LEEWAY) if self._is_low else 0)
 
@@ -285,7 +288,7 @@ class Overview(QWidget):
             self._maps[side].show_pressures(pressures, cop, live=live)
 
     def _is_off(self, station: Station) -> bool:
-        """Whether a foot carries by much another share than its figure says."""
+        """Return whether a foot carries by much another share than its figure says."""
         left = loads(station.robot)[SIDES[0]].share
         return left is not None and (self._share is None or abs(left - self._share) > SHARE)
 
@@ -327,7 +330,7 @@ def placed_flags(station: Station, seconds: float) -> list[PlacedFlag]:
 
 
 def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
-    """How much a foot carries, the fullest wording first."""
+    """Return how much a foot carries, the fullest wording first."""
     if load.problem or load.force is None:
         return f"{side.upper()}  {load.problem or 'not known'}", f"{side[0].upper()}  –"
     said = f"{force.text(load.force)} {force.symbol}"

@@ -107,7 +107,7 @@ class Player(QWidget):
         self._is_roomy, self._has_room_for_all = True, True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Where the height begins or ends to be enough for all; else labels stay as somebody wants them."""
+        """Show or hide labels as the height begins or ends to be enough; else leave them to the user."""
         super().resizeEvent(event)
         self._is_roomy = self.height() >= self._theme.px(ROOMY)
         has_room = self.height() >= self._theme.px(ALL)
@@ -117,7 +117,7 @@ class Player(QWidget):
         self._make_room()
 
     def _make_room(self) -> None:
-        """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
+        """Keep what is labelled in sight while somebody labels: the plots, beside what it was then."""
         alone = not self._has_room_for_all and self.labelling.isChecked()
         with_now = self._is_roomy or not (alone or self._was_wrong)  # an alarm says more of the drives
         self.overview.show_plots_alone(alone, with_now=with_now)

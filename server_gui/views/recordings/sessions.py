@@ -101,7 +101,7 @@ class SessionsTable(RowsTable):
                 self.setRowHeight(row, high)
 
     def _high(self, row: int) -> int:
-        """How high a row is with its notes, which are whole where they are not too long."""
+        """Return the height of a row with its notes, which are whole if they are not too long."""
         notes, one = str(self.model().index(row, NOTES).data() or ""), self._theme.px(ROW)
         if not notes or self.isColumnHidden(NOTES):
             return one

@@ -38,7 +38,7 @@ class Attempt(QObject):
         self._given_up.set()
 
     def join(self, within_s: float | None = None) -> bool:
-        """Whether its thread has ended."""
+        """Return whether its thread has ended."""
         self._thread.join(within_s)
         return not self._thread.is_alive()
 

@@ -235,7 +235,7 @@ class RobotsPanel(QWidget):
         return show_pairing(self, where, self._paired)
 
     def end_pairing(self) -> None:
-        """Before the window goes."""
+        """End it before the window goes."""
         for dialog in self.findChildren(PairingDialog):
             dialog.end(PAIRING_ENDS_S)
 

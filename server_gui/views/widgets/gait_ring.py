@@ -82,7 +82,7 @@ class GaitRing(QWidget):
         return [text for text, *_ in self._rows(self._places()[2])[0]]
 
     def _places(self) -> tuple[dict[Leg, QRectF], float, QRectF]:
-        """Where the rings are, how wide each is, and what is left in the middle."""
+        """Return where the rings are, how wide each is, and what is left in the middle."""
         side = min(self.width(), self.height()) - 6.0
         box = QRectF((self.width() - side) / 2, (self.height() - side) / 2, side, side)
         band = side * 0.075
@@ -95,7 +95,7 @@ class GaitRing(QWidget):
         return self._theme.colour(leg.value if self._live else "old")
 
     def _picture(self, rings: Mapping[Leg, QRectF], band: float) -> QPixmap:
-        """Both rings, the phases that are now bright; drawn when they become others."""
+        """Return both rings, the phases that are now bright; drawn when they become others."""
         ratio, names = self.devicePixelRatioF(), [now.phase if now else "" for now in self._phases.values()]
         key = (self.size(), ratio, self._theme.colours, self._live, *names)
         if key != self._key:
@@ -161,7 +161,7 @@ class GaitRing(QWidget):
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
 
     def _room(self, box: QRectF, top: float, line: float) -> float:
-        """How wide the circle within the inner ring is where a line stands: less above and below."""
+        """Return the width for a line within the inner ring: less above and below."""
         free = box.width() * FREE / 2
         off = abs(top + line / 2 - box.center().y()) + line * LETTERS / 2
         return 2 * math.sqrt(max(free**2 - off**2, 0.0))
@@ -203,14 +203,14 @@ class GaitRing(QWidget):
         return [one for one in next(fits, []) if one]
 
     def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
-        """With the phase's name where that has room in letters that are read."""
+        """Return the phase, with its name if that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
         fits = not is_short and self._width(full) <= room
         return full if fits else f"{letter} {now.percent:.0f} %"
 
     def _is_read(self, text: str, box: QRectF) -> bool:
-        """Whether it has room in letters that are read."""
+        """Return whether it has room in letters that are read."""
         return self._width(text) <= box.width()
 
     def _width(self, text: str) -> float:

@@ -60,5 +60,5 @@ class Overlay(QFrame):
         self.setGeometry(room.x() + (room.width() - width) // 2, room.y(), width, high)
 
     def high(self, width: int) -> int:
-        """How high it is with that width, where there is so much room: all of it, unless it needs less."""
+        """Return its height at that width, if there is so much room: all of it, unless it needs less."""
         return self._below.height()

@@ -172,7 +172,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         return 0.0 if self._is_blank else float(high - low)
 
     def choose_by_box(self, on: bool) -> None:
-        """Whether a drag chooses what is shown by a box, or moves it."""
+        """Choose whether a drag selects what is shown by a box, or moves it."""
         box = self.getViewBox()
         box.setMouseMode(box.RectMode if on else box.PanMode)
 

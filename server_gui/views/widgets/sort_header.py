@@ -88,7 +88,7 @@ class SortHeader(QHeaderView):
         self._name()
 
     def _name(self) -> None:
-        """For who hears it read."""
+        """Name it for who hears it read."""
         order, title = "", ""
         if self.count():
             title = str(self.model().headerData(self._at, Qt.Orientation.Horizontal) or "")

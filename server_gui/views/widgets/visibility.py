@@ -4,11 +4,11 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 
 def has_focus_in(panel: QWidget) -> bool:
-    """Whether the keyboard is in it."""
+    """Return whether the keyboard is in it."""
     focused = QApplication.focusWidget()
     return focused is not None and panel.isAncestorOf(focused)
 
 
 def is_seen(widget: QWidget) -> bool:
-    """Whether any of it is on the screen: not behind another panel, and not scrolled away."""
+    """Return whether any of it is on the screen: not behind another panel, and not scrolled away."""
     return widget.isVisible() and not widget.visibleRegion().isEmpty()

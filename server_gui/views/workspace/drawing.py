@@ -45,7 +45,7 @@ def _draw_plot(scene: Scene, card: UnitPlot, station: Station, times: Floats, *,
 
 
 def _comes_late(scene: Scene, card: UnitPlot) -> bool:
-    """Whether values come for rows that were drawn already."""
+    """Return whether values come for rows that were drawn already."""
     needed = (name for text in card.drawn for name in scene.meaning(text).needs)
     return scene.beside is not None or any(name.startswith(BESIDE) for name in needed)
 

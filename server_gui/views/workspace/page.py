@@ -265,7 +265,7 @@ class Signals(QWidget):
             self._build()
 
     def _looked_again(self, refused: str = "") -> None:
-        """After something was arranged, or refused."""
+        """Look again after something was arranged, or refused."""
         self.refused.take(f"▲ {refused}" if refused else "")
         if self._desk.selected is not None:
             self.scene.look(self._desk.selected)
@@ -397,7 +397,7 @@ class Signals(QWidget):
         return True
 
     def _turn(self, way: int) -> None:
-        """To the next event, or the one before: of where one has jumped to, else of the newest."""
+        """Turn to the next event, or the one before: of where one has jumped to, else of the newest."""
         station = self._desk.selected
         if station is None:
             return

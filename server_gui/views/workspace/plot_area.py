@@ -48,7 +48,7 @@ class PlotArea(QFrame):
         self.setAcceptDrops(True)
 
     def offer_below(self, wanted: bool) -> None:
-        """Have room below the lowest plot, to drop a curve there."""
+        """Offer room below the lowest plot, to drop a curve there."""
         self.below.setVisible(wanted and bool(self.cards))
 
     def build(self, seconds: float, window: tuple[float, float] | None) -> None:

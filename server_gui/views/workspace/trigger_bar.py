@@ -82,7 +82,7 @@ class TriggerBar(Card):
         self._fit()
 
     def show_condition(self, condition: Condition) -> None:
-        """Have all fields say this."""
+        """Show this in all fields."""
         self.on.setCurrentText(condition.on.value)
         if self.of.findText(condition.of) < 0:
             self.of.addItem(condition.of)
@@ -155,11 +155,11 @@ class NumberField(QLineEdit):
             return math.nan
 
     def set_value(self, value: float) -> None:
-        """Have this number stand there."""
+        """Show this number."""
         self.setText(f"{value:.6g} {self._suffix}".rstrip())
 
     def set_suffix(self, suffix: str, factor: float = 1.0) -> None:
-        """Have another unit behind it, and `factor` as many of it."""
+        """Show another unit behind it, and `factor` as many of it."""
         value, self._suffix = self.value, suffix
         if math.isfinite(value):
             self.set_value(value * factor)

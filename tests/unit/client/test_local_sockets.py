@@ -1,9 +1,11 @@
 """A robot with keys on its own computer: its accounts find its Unix socket by themselves."""
 
 import contextlib
+import dataclasses
 import os
 import shutil
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,6 +40,13 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
+def folder(tmp_path: Path, session: Path) -> Path:
+    """Where a user's gateway with keys has its socket."""
+    assert session.is_dir()
+    return tmp_path / "config" / "gwrms"
+
+
+@pytest.fixture
 def address(tmp_path: Path, session: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Address]:
     """Of a robot with keys, started as `gwrms gateway` starts it; the user here has no key."""
     assert session.is_dir()
@@ -57,24 +66,39 @@ def test_the_user_of_a_robot_with_keys_stops_and_resets_it_there_without_a_key(
 
 
 def test_a_stale_socket_and_one_of_another_robot_are_passed_over(
-    address: Address, session: Path, tmp_path: Path
+    address: Address, folder: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "other").mkdir()
     other = config(tmp_path / "other", HEAD.replace("exo-test", "a-first-one"))
     with socket.socket(socket.AF_UNIX) as stale:
-        stale.bind(str(session / "gwrms" / "0-stale.sock"))
+        stale.bind(str(folder / "0-stale.sock"))
     with serving(other, local=serve._local(other)), Robot(address, ONCE) as robot:
         assert robot.hello is not None
         assert robot.hello.robot == "exo-test"
         assert robot.hello.listens == str(address)
 
 
+def test_a_program_that_never_answers_at_a_socket_delays_nobody(address: Address, folder: Path) -> None:
+    began_s, patient = time.monotonic(), dataclasses.replace(ONCE, call_timeout_s=60)
+    with listen_locally(folder / "0-hung.sock"), Robot(address, patient) as robot:
+        assert robot.hello is not None
+        assert robot.hello.robot == "exo-test"
+        assert time.monotonic() - began_s < patient.call_timeout_s
+
+
 def test_a_socket_in_a_folder_that_others_may_write_to_is_not_believed(
-    address: Address, session: Path
+    address: Address, folder: Path
 ) -> None:
-    (session / "gwrms").chmod(0o777)
+    folder.chmod(0o777)
     with pytest.raises(LinkLost, match=r"gwrms pair.*at its Unix socket"):
         Robot(address, ONCE)
+
+
+def test_a_folder_that_another_user_has_made_is_not_believed(folder: Path) -> None:
+    folder.mkdir(parents=True)
+    made_by = folder.stat().st_uid
+    assert own_folders._is_safe(folder, {made_by})
+    assert not own_folders._is_safe(folder, {made_by + 1})
 
 
 def test_another_robot_that_is_pinned_there_is_not_gone_around(address: Address) -> None:
@@ -85,20 +109,17 @@ def test_another_robot_that_is_pinned_there_is_not_gone_around(address: Address)
         Robot(Address(address.host, address.port, keys.pin("impostor")), ONCE)
 
 
-def test_where_nobody_listens_the_only_gateway_with_that_port_is_meant(
-    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As where host is one address of the computer's, and the command asks the usual 127.0.0.1."""
-    assert session.is_dir()
-    robot = config(tmp_path)
-    with serving(robot, local=serve._local(robot)) as (_host, port):
-        elsewhere = Address("127.0.0.9", port)
-        with Robot(elsewhere, ONCE) as found:
-            assert found.hello is not None
-            assert found.hello.robot == "exo-test"
-        monkeypatch.setattr("gateway.client.link.listens_at", lambda *_: False)
-        with pytest.raises(Unreachable, match=r"no gateway at 127\.0\.0\.9"):
-            Robot(elsewhere, ONCE)
+def test_a_paired_robot_is_never_asked_at_a_socket(address: Address, folder: Path) -> None:
+    """Nothing there proves to have its key: this desk was revoked, and has an account on the robot, too."""
+    assert local_sockets(address) == [Address(str(folder / "exo-test.sock"), 0)]
+    assert local_sockets(Address(address.host, address.port, keys.pin("impostor"))) == []
+
+
+def test_another_robot_does_not_stand_in_for_one_whose_gateway_is_off(address: Address, folder: Path) -> None:
+    """It has the same port of another host; a stop would be confirmed by drives that nobody meant."""
+    elsewhere = Address("127.0.0.9", address.port)
+    with pytest.raises(Unreachable, match=rf"no gateway at 127\.0\.0\.9.*--robot {folder}/exo-test\.sock"):
+        Robot(elsewhere, ONCE)
 
 
 @pytest.mark.parametrize(
@@ -106,34 +127,40 @@ def test_where_nobody_listens_the_only_gateway_with_that_port_is_meant(
     [
         ("127.0.0.1:7420", True),
         ("0.0.0.0:7420", True),
-        ("[::]:7420", True),
-        ("192.0.2.7:7420", None),
+        ("[::]:7420", False),
+        ("127.0.0.2:7420", False),
+        ("192.0.2.7:7420", False),
         ("127.0.0.1:7421", False),
         (None, False),
     ],
 )
-def test_whether_a_gateway_is_the_one_at_an_address(listens: str | None, expected: bool | None) -> None:
+def test_whether_a_gateway_is_the_one_at_an_address(listens: str | None, expected: bool) -> None:
     assert listens_at(Address(), listens) is expected
-    assert listens_at(Address("localhost"), listens) is expected
 
 
-def test_no_socket_here_stands_for_another_computer(session: Path) -> None:
-    with listen_locally(session / "gwrms" / "exo.sock"):
-        assert [one.host for one in local_sockets(Address())] == [str(session / "gwrms" / "exo.sock")]
-        assert not list(local_sockets(Address("192.0.2.7")))
+def test_localhost_is_both_families() -> None:
+    for listens in ("127.0.0.1:7420", "[::1]:7420", "[::]:7420", "0.0.0.0:7420"):
+        assert listens_at(Address("localhost"), listens)
+    assert not listens_at(Address("::1"), "0.0.0.0:7420")
+
+
+def test_no_socket_here_stands_for_another_computer(folder: Path) -> None:
+    with listen_locally(folder / "exo.sock"):
+        assert [one.host for one in local_sockets(Address())] == [str(folder / "exo.sock")]
+        assert not local_sockets(Address("192.0.2.7"))
 
 
 @pytest.mark.parametrize(
     ("broken", "expected"),
-    [("", "run/gwrms/exo-test.sock"), ("run", "config/gwrms/exo-test.sock"), ("all", None)],
+    [("", "config/gwrms/exo-test.sock"), ("config", "run/gwrms/exo-test.sock"), ("all", None)],
 )
 def test_with_keys_there_is_a_socket_wherever_one_can_be(
     broken: str, expected: str | None, session: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     if broken:
-        (session / "gwrms").write_text("no folder")
-    if broken == "all":
         (tmp_path / "config").write_text("no folder")
+    if broken == "all":
+        (session / "gwrms").write_text("no folder")
     made = serve._local(config(keyed(tmp_path)))
     assert (made is None) == (expected is None)
     if made is not None:
@@ -162,15 +189,15 @@ def test_the_system_s_folder_comes_first_where_it_may_be_used(
     assert own_folders.to_serve_in(os.environ)[0] == tmp_path / "system" / "gwrms"
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert own_folders.to_serve_in(os.environ)[0] == session
+    assert own_folders.to_serve_in(os.environ) == [tmp_path / "config" / "gwrms", session / "gwrms"]
 
 
 def test_root_by_sudo_looks_where_the_user_s_own_gateway_is(
     session: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Path] = []
-    monkeypatch.setattr(own_folders, "_is_safe", lambda folder: not asked.append(folder))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(own_folders, "_is_safe", lambda folder, _: not asked.append(folder))  # type: ignore[func-returns-value]
     monkeypatch.setattr(Path, "is_dir", lambda self: str(self) == "/run/user/1234")
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     own_folders.to_look_in({"SUDO_UID": "1234", "XDG_RUNTIME_DIR": str(session)})
-    assert asked[1:3] == [session / "gwrms", Path("/run/user/1234/gwrms")]
+    assert [asked[1], asked[3]] == [session / "gwrms", Path("/run/user/1234/gwrms")]

@@ -49,6 +49,12 @@ def test_an_overloaded_computer_is_said_before_the_cable(
     assert check(station) == "; then ".join((*first, CABLE))
 
 
+def test_no_load_is_blamed_for_a_port_that_is_gone(station: Station) -> None:
+    station.is_overloaded = lambda: True
+    station.take([looked(state="lost", problem="/dev/ttyUSB0 does not exist: plug the device in")])
+    assert check(station) == "plug the device in"
+
+
 def test_a_fault_is_not_said_to_come_from_a_busy_computer(station: Station) -> None:
     station.is_overloaded = lambda: True
     station.take([looked(state="fault", problem="the drive is in fault: 0x2310 overcurrent")])

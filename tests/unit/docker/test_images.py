@@ -94,6 +94,9 @@ def test_versions_are_those_of_the_lock() -> None:
     assert versions == re.findall(r"^(\w[^\\\n]*?) \\?$", lines, re.MULTILINE)
 
 
+ASKED = re.compile(r"gwrms pair (127\.0\.0\.1:\d+)\s+It asks for this code:\s+(\S+)")
+
+
 @pytest.fixture
 def programs(tmp_path: Path) -> dict[str, str]:
     """An environment in which `gwrms` is ours."""
@@ -110,7 +113,9 @@ def programs(tmp_path: Path) -> dict[str, str]:
     }
 
 
-def test_the_simulators_image_serves_a_robot_and_ends_whole(programs: dict[str, str], tmp_path: Path) -> None:
+def test_the_simulators_image_serves_a_robot_with_keys_once_paired_and_ends_whole(
+    programs: dict[str, str], tmp_path: Path
+) -> None:
     said = tmp_path / "said"
     with said.open("wb") as out:
         process = subprocess.Popen(
@@ -121,7 +126,11 @@ def test_the_simulators_image_serves_a_robot_and_ends_whole(programs: dict[str, 
             process_group=0,
         )
     try:
-        until(lambda: "listening on 127.0.0.1:" in said.read_text(), 60.0)
+        until(lambda: said.read_text().count("listening on 127.0.0.1:") == 1, "it listens without keys")
+        asked = until(lambda: ASKED.search(said.read_text()), "it shows a code")
+        home = programs | {"HOME": str(tmp_path)}
+        subprocess.run(["gwrms", "pair", *asked.groups()], env=home, check=True, capture_output=True)
+        until(lambda: said.read_text().count("listening on 127.0.0.1:") == 2, "it listens with keys")
         process.send_signal(signal.SIGTERM)
         assert process.wait(60.0) == 128 + signal.SIGTERM
         with pytest.raises(ProcessLookupError):

@@ -134,6 +134,7 @@ def test_a_lease_that_ends_meanwhile_ends_it(
         client.call("control.release")
         first.set_result(Led(S.READY_TO_SWITCH_ON))
         problems = client.answer(enabling)["problems"]
+        assert problems
         assert all("the lease" in problem for problem in problems.values())
         assert (bench.left.stops, bench.right.stops) == (1, 1)
         assert bench.right.steps == [S.SWITCH_ON_DISABLED]

@@ -4,7 +4,7 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
 from server_gui.core.follow.events import BusesSeen, Described
-from server_gui.core.follow.missing_pdos import BEGINS_NS, LOST_NS, MissingPdos
+from server_gui.core.follow.missing_pdos import BEGINS_NS, LOST_NS, MissingPdos, told_percent
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from server_gui.core.processing.bus_health import findings, level
@@ -69,6 +69,18 @@ def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> Non
     assert "gwrms blame" in check
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=40.0)[-1])[0][0]
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=97.0, nodes=1)[-1])[0][0]
+
+
+def test_where_one_node_is_told_no_other_with_as_many_looks_fine() -> None:
+    watched, of_look = MissingPdos(), ((20.0, 2.3, 0.4), (0.0, 0.0, 0.0))
+    told = []
+    for second, percents in enumerate(of_look):
+        each = [
+            replace(NODE, node_id=number, pdos_missing_percent=one) for number, one in enumerate(percents)
+        ]
+        (bus,) = watched.take((replace(BUS, nodes=each),), second * SECOND_NS)
+        told.append([told_percent(node) for node in bus.nodes])
+    assert told == [[20.0, 2.3, 0.0]] * 2, "and both last as long"
 
 
 def test_what_was_seen_before_a_time_without_a_look_lasts_no_longer() -> None:

@@ -33,7 +33,9 @@ def test_every_step_is_found_where_the_threshold_is_crossed(kind: EventKind) -> 
 
 
 def test_an_event_is_known_when_it_has_lasted() -> None:
-    for event in fed(PressureEvents(Leg.LEFT).feed, walk()):
+    events = fed(PressureEvents(Leg.LEFT).feed, walk())
+    assert events
+    for event in events:
         assert CONFIRM_NS <= event.known_ns - event.stamp_ns <= CONFIRM_NS + DT_NS
 
 
