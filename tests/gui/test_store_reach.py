@@ -213,7 +213,11 @@ def test_a_knock_that_is_asked_for_while_another_one_is_under_way_is_made_after_
     made, came = list[str](), list[Callable[[], None]]()
 
     def seen(what: str, problem: str | None) -> Callable[[ServerSettings], Found]:
-        return lambda _settings: (made.append(what), Found(problem=problem))[1]
+        def look(_settings: ServerSettings) -> Found:
+            made.append(what)
+            return Found(problem=problem)
+
+        return look
 
     monkeypatch.setattr(library, "knock", seen("knock", None))
     monkeypatch.setattr(library, "look", seen("look", DAMAGED))

@@ -25,7 +25,6 @@ from server_gui.core.follow.events import BusesSeen, Described, Event, Journalle
 from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot_news import RobotNews
-from server_gui.core.tuning.stop import StopState
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
@@ -301,37 +300,6 @@ def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("said", "why"),
-    [
-        (Stopped({}, held=True), "no drive answered"),
-        (Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}), "controller gait unreachable"),
-    ],
-)
-def test_a_stop_is_confirmed_by_drives_and_every_controller_or_not_at_all(
-    bench: Bench, said: Stopped, why: str
-) -> None:
-    stopping = bench.station.stopping
-    old, new = stopping.sent(), stopping.sent()
-    stopping.failed(old, "the link of the one before broke")
-    assert stopping.state is StopState.SENT
-    stopping.answered(new, said)
-    assert (stopping.state, stopping.why) == (StopState.NOT_CONFIRMED, why)
-
-
-def test_the_answer_dates_no_drive_that_has_not_confirmed_the_stop(bench: Bench) -> None:
-    stopping = bench.station.stopping
-    number = stopping.sent(at_ns=0)
-    columns = {"left_knee": ["quick stop active"], "right_knee": ["quick stop active"]}
-    stopping.show([200_000_000], columns, 0)
-    said = Stopped({"left_knee": "confirmed", "right_knee": "unconfirmed"}, held=True)
-    stopping.answered(number, said, at_ns=100_000_000)
-    assert {name: proof.after_ms for name, proof in stopping.proofs.items()} == {
-        "left_knee": 100.0,
-        "right_knee": 200.0,
-    }
-
-
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
@@ -414,57 +382,6 @@ def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench:
     reset = {"n": 8, "hash": "b", "who": "gwrms reset", "what": "reset", "held": False}
     bench.station.take([Journalled(JournalEntries([stop, reset], None))])
     assert not bench.station.stopping.held
-
-
-def written(number: int, what: str, **more: object) -> dict[str, object]:
-    return {"n": number, "hash": str(number), "who": "gwrms", "what": what, "utc_ns": number, **more}
-
-
-RESET = written(6, "reset", held=False)
-
-
-def test_a_confirmed_stop_that_was_reset_while_there_was_no_link_is_not_shown_any_more(bench: Bench) -> None:
-    """Header and table said that it is confirmed while the robot walked."""
-    stopping = bench.station.stopping
-    bench.station.stop("test")
-    bench.first.answer(ALL)
-    stopping.read([written(5, "stop")])
-    stopping.described(held=False, reason=None)
-    assert (stopping.stage, stopping.was_ended) == ((StopState.IDLE, False), True)
-    bench.station.stop("test")
-    bench.first.answer(ALL)
-    stopping.described(held=False, reason=None)  # it may be older than this stop
-    assert stopping.state is StopState.CONFIRMED
-    stopping.read([RESET, written(7, "stopped again", drive="left_knee"), written(8, "stop")])
-    assert stopping.stage == (StopState.CONFIRMED, True)
-    stopping.read([written(9, "reset", held=False)])
-    assert stopping.stage == (StopState.IDLE, False)
-
-
-def test_a_reset_before_a_stop_does_not_end_it(bench: Bench) -> None:
-    stopping = bench.station.stopping
-    stopping.read([written(4, "stop")])
-    bench.station.stop("test")
-    bench.first.answer(ALL)
-    stopping.read([RESET])
-    assert stopping.stage == (StopState.CONFIRMED, True)
-    stopping.read([RESET, written(7, "stopped again")])
-    stopping.read([written(8, "reset", held=False)])
-    assert stopping.stage == (StopState.IDLE, False)
-
-
-def test_of_a_reset_before_the_window_came_nobody_knows_what_was_enabled_since(bench: Bench) -> None:
-    stopping = bench.station.stopping
-    stopping.read([written(5, "stop"), RESET])
-    assert (stopping.stage, stopping.was_ended) == ((StopState.IDLE, False), False)
-    stopping.read([written(7, "stop"), written(8, "reset", held=False, utc_ns=9_000_000_000)])
-    assert (stopping.was_ended, stopping.since_s) == (True, 9.0)
-
-
-def test_a_stop_in_a_journal_that_begins_anew_is_read(bench: Bench) -> None:
-    bench.station.stopping.read([written(500, "stop"), written(501, "reset", held=False)])
-    bench.station.stopping.read([written(1, "begun"), written(2, "stop", reason="door")])
-    assert bench.station.stopping.held
 
 
 # --- names and news
