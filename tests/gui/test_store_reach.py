@@ -1,6 +1,7 @@
 """Whether the store is reached is decided once: what the newest look said, and how uploading goes."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
-from server_gui.core.archive.library import Library
+from server_gui.core.archive.library import Found, Library
 from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import By, Recording
@@ -51,8 +52,12 @@ def test_a_store_that_was_away_stays_so_until_a_look_says_otherwise() -> None:
     reach.looked(AWAY)
     clock.now_s += 10 * KNOWN_S
     assert (reach.state, reach.trouble) == (Reach.AWAY, AWAY)
+    reach.looked(AWAY)
     clock.now_s += AGAIN_S
+    assert reach.is_due
     reach.looked(None)
+    clock.now_s += AGAIN_S
+    assert not reach.is_due
     assert (reach.state, reach.trouble, back) == (Reach.REACHED, None, ["back"])
     reach.looked(None)
     assert back == ["back"]
@@ -198,4 +203,46 @@ def test_a_knock_sees_a_folder_that_has_gone_and_that_is_back(
     looking.knock()
     until(lambda: looking.reach.state is Reach.REACHED)
     assert looking.revision == 0, "nothing was listed"
+    assert looking.close(WAIT_S)
+
+
+def test_a_knock_that_is_asked_for_while_another_one_is_under_way_is_made_after_it(
+    settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And of a list that is damaged no first file is asked."""
+    made, came = list[str](), list[Callable[[], None]]()
+
+    def seen(what: str, problem: str | None) -> Callable[[ServerSettings], Found]:
+        def look(_settings: ServerSettings) -> Found:
+            made.append(what)
+            return Found(problem=problem)
+
+        return look
+
+    monkeypatch.setattr(library, "knock", seen("knock", None))
+    monkeypatch.setattr(library, "look", seen("look", DAMAGED))
+    looking = Library(settings, came.append)
+    for now in (True, True, False):
+        looking.knock(now=now)
+    until(lambda: came).pop()()
+    until(lambda: came).pop()()
+    assert made == ["knock", "knock"]
+    looking.reach.listed(DAMAGED)
+    looking.knock(now=True)
+    until(lambda: came).pop()()
+    assert (made[2:], looking.reach.state) == (["look"], Reach.UNREADABLE)
+    assert looking.close(WAIT_S)
+
+
+def test_of_a_look_that_fails_by_a_mistake_of_ours_the_store_is_not_called_reached(
+    settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(_settings: ServerSettings) -> Found:
+        raise KeyError("a mistake of ours")
+
+    monkeypatch.setattr(library, "look", fails)
+    looking = Library(settings, lambda call: call())
+    looking.look(now=True)
+    until(lambda: looking.looked_s)
+    assert looking.reach.state is Reach.AWAY
     assert looking.close(WAIT_S)

@@ -8,24 +8,55 @@ import pytest
 from msgspec.structs import replace
 
 from drivers.error_codes import error_check
-from gateway.client import ConnectionState
+from gateway.client import ConnectionState, LinkLost, NotConnected
 from gateway.main import COMMANDS
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo, Snapshot
+from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
+from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.desk import station as station_module
+from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.events import BusesSeen, Described, LinkChanged, Looked
+from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
+from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
-from tests.support.desk import Bench, described, looked, telemetry, walking
-from tests.unit.desk.alarming import CAUSE, fault, kinds, link_lost, states, walking_bench
+from server_gui.core.follow.robot_news import RobotNews
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+
+CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
+ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return walking_bench(monkeypatch)
+    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    made = Bench(Desk())
+    made.add("exo-01").take([described(), walking(50), looked()])
+    return made
+
+
+def states(number: float, **others: float) -> Event:
+    """A row, just now, with every drive in this state but these."""
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {
+        f"{joint}.state": [others.get(joint, number)] for joint in JOINTS
+    }
+    return telemetry([now_ns], columns, now_ns)
+
+
+def kinds(station: Station) -> list[Kind]:
+    return [one.alarm.kind for one in station.alarms.active]
+
+
+def fault(station: Station) -> None:
+    station.take(
+        [states(5.0, left_knee=7.0), looked(state="fault", problem=f"the drive is in fault: {CAUSE}")]
+    )
 
 
 def test_a_robot_that_is_well_has_no_alarm_and_is_as_its_drives_are(bench: Bench) -> None:
@@ -114,6 +145,10 @@ def test_what_is_acknowledged_is_no_better_for_it(bench: Bench) -> None:
     assert bench.station.mark.word == "fault"
 
 
+def _link_lost(bench: Bench) -> None:
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+
+
 def _never_reached(bench: Bench) -> None:
     lost = LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())
     bench.desk.stations[0] = Station("x", "127.0.0.1:1", bench.first, lambda call: call(), News())
@@ -138,7 +173,7 @@ def _stale(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("happens", "kind"),
     [
-        (link_lost, Kind.NO_LINK),
+        (_link_lost, Kind.NO_LINK),
         (_never_reached, Kind.NEVER_REACHED),
         (_another, Kind.ANOTHER),
         (_no_data, Kind.NO_DATA),
@@ -192,6 +227,161 @@ def test_a_rule_that_has_tripped_says_why_and_what_it_did(bench: Bench) -> None:
     assert (one.alarm.kind, one.alarm.what) == (Kind.GUARD, "71 N·m")
     assert "quick stop" in one.alarm.did
     assert one.alarm.channel == "left_knee.torque"
+
+
+# --- STOP
+
+
+def test_a_confirmed_stop_is_proved_drive_by_drive_and_says_how_to_go_on(bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.station.take([states(5.0)])
+    bench.first.answer(ALL)
+    stopping = bench.station.stopping
+    assert set(stopping.proofs) == set(JOINTS)
+    assert all(proof.state == "quick stop active" for proof in stopping.proofs.values())
+    (one,) = bench.station.alarms.active
+    assert one.alarm.kind is Kind.STOPPED
+    assert "all 6 drives confirmed in quick stop active within" in one.alarm.did
+    assert "Reset stop…" in one.alarm.check
+
+
+def test_rows_from_before_the_stop_prove_nothing(bench: Bench) -> None:
+    before = states(5.0)
+    bench.station.stop("test")
+    bench.station.take([before])
+    assert bench.station.stopping.proofs == {}
+
+
+def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
+    _link_lost(bench)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    assert kinds(bench.station) == [Kind.NOT_STOPPED, Kind.NO_LINK]
+    assert "still moving" not in bench.station.alarms.active[0].alarm.line
+    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
+    assert "still moving: STOP again" in bench.station.alarms.active[0].alarm.line
+    assert bench.station.mark.word == "STOP NOT CONFIRMED"
+
+
+def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    bench.station.take([states(5.0, left_knee=4.0)])
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    bench.station.take([states(5.0)])
+    proofs = bench.station.stopping.proofs
+    assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
+    assert proofs["left_hip"].when == "already off"
+
+
+def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_already(bench: Bench) -> None:
+    bench.station.take([states(4.0)])
+    sent = bench.station.send_stop("a key, in a thread of its own")
+    stopped = states(5.0)
+    bench.station.take([stopped])
+    bench.station.note_stop(sent)
+    bench.station.take([stopped])
+    proofs = bench.station.stopping.proofs
+    assert set(proofs) == set(JOINTS)
+    assert not any(proof.was_so for proof in proofs.values())
+
+
+def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
+    told: list[str] = []
+    news = RobotNews(lambda _kind, text, _about="": told.append(text))
+    for event in (states(4.0), states(5.0), states(5.0, left_knee=4.0)):
+        bench.station.take([event])
+        news.look(bench.station.robot)
+    assert [text for text in told if "→" in text] == [
+        "all 6 drives: operation enabled → quick stop active",
+        "left knee: quick stop active → operation enabled",
+    ]
+
+
+def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
+    fault(bench.station)
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    assert kinds(bench.station) == [Kind.FAULT, Kind.STOPPED]
+
+
+def test_after_a_reset_it_says_how_to_go_on_until_a_drive_is_enabled(bench: Bench) -> None:
+    bench.station.take([states(5.0)])
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    bench.station.reset()
+    bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    (one,) = bench.station.alarms.active
+    assert one.alarm.kind is Kind.RESET
+    assert "to go on: enable the drives: start the robot's controller again" in one.alarm.check
+    bench.station.take([states(4.0)])
+    assert kinds(bench.station) == []
+
+
+def test_a_drive_that_does_not_leave_fault_is_told_and_no_success(bench: Bench) -> None:
+    fault(bench.station)
+    told: list[str] = []
+    bench.station.reset(told.append)
+    stays = "it stays in fault: 0x4310 drive temperature too high; let it cool, then reset it again"
+    drives = {**dict.fromkeys(JOINTS, "switch on disabled"), "left_knee": "fault"}
+    bench.first.answer(Reset(drives, {"left_knee": stays}, held=False))
+    assert told == [f"left_knee DID NOT LEAVE FAULT: {stays}"]
+    grave = bench.desk.news.items[0]
+    assert (grave.kind, grave.text) == (NewsKind.FAULT, told[0])
+    assert not any("every drive is off" in item.text for item in bench.desk.news.items)
+
+
+def test_a_clearing_that_was_refused_is_told_too(bench: Bench) -> None:
+    told: list[str] = []
+    bench.station.reset(told.append)
+    bench.first.fail(NotConnected("bob has the lease"))
+    assert told == ["Nothing was cleared: bob has the lease"]
+
+
+def test_of_a_clearing_whose_answer_was_lost_nobody_knows(bench: Bench) -> None:
+    told: list[str] = []
+    bench.station.reset(told.append)
+    bench.first.fail(LinkLost("the link broke"))
+    assert told == ["Nobody knows whether anything was cleared: the link broke"]
+
+
+def test_an_answer_to_a_reset_takes_no_stop_away_that_was_sent_meanwhile(bench: Bench) -> None:
+    bench.station.reset()
+    reset = bench.first.futures[-1]
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    reset.set_result(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    assert bench.station.stopping.held
+    assert kinds(bench.station) == [Kind.STOPPED]
+
+
+def test_a_look_for_alarms_that_ends_half_way_is_no_look(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("a mistake of ours")
+
+    fault(bench.station)
+    with one_moment():
+        bench.station.take([])
+        with monkeypatch.context() as patched:
+            patched.setattr(station_module, "found", fails)
+            for _ in range(2):  # the second place that asks gets no old ones either
+                with pytest.raises(ValueError, match="a mistake"):
+                    _ = bench.station.alarms
+        assert kinds(bench.station) == [Kind.FAULT]
+
+
+def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench: Bench) -> None:
+    stop = {"n": 7, "hash": "a", "who": "gwrms stop", "what": "stop", "reason": "door", "utc_ns": 5}
+    bench.station.take([Journalled(JournalEntries([stop], None))])
+    assert bench.station.stopping.held
+    assert "door, by gwrms stop" in bench.station.alarms.active[0].alarm.what
+    reset = {"n": 8, "hash": "b", "who": "gwrms reset", "what": "reset", "held": False}
+    bench.station.take([Journalled(JournalEntries([stop, reset], None))])
+    assert not bench.station.stopping.held
 
 
 # --- names and news

@@ -1,15 +1,18 @@
 """One severity: an event, an alarm and a bus say how bad a thing is by the one table of alarms."""
 
+import dataclasses
+
 import pytest
 from msgspec.structs import replace
 
 from gateway.wire.component import QualityInfo, Snapshot
+from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.marks import NEWS, Mark
-from server_gui.core.alarms.severity import bus_level, event_mark
+from server_gui.core.alarms.severity import bus_level, colour_of, event_mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described, Event, Looked
-from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from tests.support.desk import Bench, described, looked, walking
 
@@ -47,6 +50,9 @@ def test_a_stale_drive_is_as_bad_in_its_event_as_in_its_alarm_and_at_its_bus(
     (event,) = (item for item in bench.station.news.items if item.text.startswith("left knee stale"))
     assert alarm.mark.colour == colour
     assert event_mark(event, alarms) == Mark(alarm.mark.shape, colour, "STALE")
+    earlier = dataclasses.replace(event, utc_s=event.utc_s - 60.0)
+    assert event_mark(earlier, alarms) == NEWS[NewsKind.STALE], "the alarm is about another time"
+    assert bus_level(Level.ALARM, "main", alarms) is Level.ALARM
     assert bus_level(Level.WARNING, "main", alarms) is (Level.ALARM if follows else Level.WARNING)
     assert bus_level(Level.GOOD, "other", alarms) is Level.GOOD
     bench.look_again(
@@ -60,6 +66,13 @@ def test_a_stale_drive_is_as_bad_in_its_event_as_in_its_alarm_and_at_its_bus(
         ]
     )
     assert event_mark(event, bench.station.alarms) == NEWS[NewsKind.STALE], "what is over is as it was told"
+
+
+def test_of_two_alarms_about_one_thing_the_worse_one_counts() -> None:
+    alarms, news = Alarms(), News()
+    alarms.look([Alarm(Kind.LOST, "left_knee", "gone"), Alarm(Kind.PART_STALE, "left_knee", "old")], 100.0)
+    news.add(NewsKind.STALE, "exo-01", "left knee stale", "left_knee")
+    assert event_mark(news.items[0], alarms).colour == colour_of("left_knee", alarms) == "bad"
 
 
 def test_without_an_alarm_an_event_is_as_bad_as_the_table_says() -> None:

@@ -11,7 +11,7 @@ import pytest
 from ml.store import StoreError
 from ml.store.sessions import Session
 from server_gui.core.archive.playback import Playback
-from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, SideBySide
+from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, By, SideBySide
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Shown
 from server_gui.core.settings.server_file import ServerSettings
@@ -142,3 +142,19 @@ def test_a_second_that_is_read_when_the_first_was_closed_is_put_away_with_a_word
     beside.both.open(beside.second.session)
     beside.draw()
     assert (beside.both.problem, beside.is_together) == ("", True)
+
+
+def test_a_recording_that_is_read_when_nobody_wants_it_any_more_is_not_shown(beside: Beside) -> None:
+    beside.held = []
+    beside.both.open(beside.second.session)
+    beside.both.close()
+    for call in beside.held:
+        call()
+    assert (beside.both.second.tape, beside.both.station, beside.both.problem) == (None, None, "")
+
+
+def test_without_a_heel_strike_the_beginnings_stay_aligned(beside: Beside) -> None:
+    assert "no heel strike" in beside.both.align(By.HEEL_STRIKE)
+    assert beside.both.by is By.START
+    beside.jump(5.0)
+    assert beside.is_together

@@ -18,8 +18,9 @@ from ml.danger.false_alarm_budget import (
     share_interval,
     thresholds,
 )
-from ml.danger.levels import CALM_S, HOLD, URGENT, Level, Levels, sustained
-from ml.danger.monitor import DangerMonitor, Evidence
+from ml.danger.levels import CALM_S, HOLD, RELEASE, URGENT, Level, Levels, sustained
+from ml.danger.monitor import COMPARE, STRANGE_S, DangerMonitor, Evidence
+from ml.danger.nearest_neighbours import NearestNeighbours
 from ml.danger.observation import CHANNELS
 
 PERIOD_NS = 140_000_000  # as seldom as can be: it is learned from seconds, not from rows
@@ -164,6 +165,45 @@ def test_the_shipped_calibration_names_its_detectors_levels_and_source() -> None
     assert set(CALIBRATION.thresholds) == {level.word for level in URGENT}
     assert all(math.isfinite(one) for one in CALIBRATION.thresholds.values())
     assert "simulated" in CALIBRATION.learned_from
+
+
+def test_a_level_lasts_while_its_odds_are_only_a_little_below_its_threshold() -> None:
+    levels, met = Levels(CALIBRATION.by_level), CALIBRATION.by_level[Level.ALARM]
+    for at_s in range(HOLD):
+        levels.take(float(at_s), met)
+    assert {levels.take(10.0 + at_s, met - 0.9 * RELEASE) for at_s in range(9)} == {Level.ALARM}
+    assert [levels.take(20.0 + at_s, met - 1.1 * RELEASE) for at_s in range(3)][-1] < Level.ALARM
+
+
+def test_a_centre_of_pressure_is_not_held_when_its_foot_is_in_the_air(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[list[float]] = []
+
+    def take(_self: Evidence, _at_s: float, values: np.ndarray) -> np.ndarray:
+        seen.append(values.tolist())
+        return np.full(len(DETECTORS), np.nan)
+
+    monkeypatch.setattr(Evidence, "take", take)
+    watch = DangerMonitor(CALIBRATION)
+    watch.take(0, [1.0] * len(CHANNELS))
+    watch.take(40_000_000, [None] * len(CHANNELS))
+    gone = {name for name, value in zip(CHANNELS, seen[1], strict=True) if math.isnan(value)}
+    assert gone == {name for name in CHANNELS if ".cop_" in name}
+
+
+def test_what_is_like_nothing_before_is_compared_with_nothing_for_a_while(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    evidence, nothing = Evidence(), np.full(len(CHANNELS), np.nan)
+    monkeypatch.setattr(Baseline, "take", lambda _self, _at_s, numbers, **_: np.zeros(len(numbers)))
+    monkeypatch.setattr(NearestNeighbours, "measure", lambda self, _now, **_: self.said)
+    silent = []
+    for at_s, alike in ((1.0, True), (2.0, False), (2.0 + STRANGE_S / 2, True), (2.1 + STRANGE_S, True)):
+        evidence._neighbours.alike = alike
+        above = evidence.take(at_s, nothing)
+        silent.append({name for name, one in zip(DETECTORS, above, strict=True) if math.isnan(one)})
+    assert silent == [set(), set(COMPARE), set(COMPARE), set()]
 
 
 def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(

@@ -49,6 +49,11 @@ def test_one_look_that_misses_two_percent_is_nothing_and_twenty_are_told_at_once
     ]
 
 
+def test_a_few_in_seldom_looks_are_told_after_enough_of_them() -> None:
+    assert changes(looks(*[1.5] * 3, every_s=5.0)) == [Level.GOOD]
+    assert changes(looks(*[1.5] * 4, every_s=5.0)) == [Level.GOOD, Level.WARNING]
+
+
 def test_a_look_that_does_not_know_it_ends_nothing_until_it_has_lasted() -> None:
     """It counted as one that has found none: ten seconds of not knowing made a node well."""
     unknown = [None] * 15

@@ -1,0 +1,86 @@
+"""A STOP as the window knows it: by its answer, the drives' rows, the link and the robot's journal."""
+
+import pytest
+
+from gateway.wire.stop import Stopped
+from server_gui.core.tuning.stop import StopProgress, StopState
+
+ALL = Stopped({"left_knee": "confirmed", "right_knee": "confirmed"}, held=True)
+
+
+def written(number: int, what: str, **more: object) -> dict[str, object]:
+    return {"n": number, "hash": str(number), "who": "gwrms", "what": what, "utc_ns": number, **more}
+
+
+RESET = written(6, "reset", held=False)
+
+
+def test_a_confirmed_stop_that_was_reset_while_there_was_no_link_is_not_shown_any_more() -> None:
+    """Header and table said that it is confirmed while the robot walked."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping.read([written(5, "stop")])
+    stopping.described(held=False, reason=None)
+    assert (stopping.stage, stopping.was_ended) == ((StopState.IDLE, False), True)
+    stopping.answered(stopping.sent(), ALL)
+    stopping.described(held=False, reason=None)  # it may be older than this stop
+    assert stopping.state is StopState.CONFIRMED
+    stopping.read([RESET, written(7, "stopped again", drive="left_knee"), written(8, "stop")])
+    assert stopping.stage == (StopState.CONFIRMED, True)
+    stopping.read([written(9, "reset", held=False)])
+    assert stopping.stage == (StopState.IDLE, False)
+
+
+def test_a_reset_before_a_stop_does_not_end_it() -> None:
+    stopping = StopProgress()
+    stopping.read([written(4, "stop")])
+    stopping.answered(stopping.sent(), ALL)
+    stopping.read([RESET])
+    assert stopping.stage == (StopState.CONFIRMED, True)
+    stopping.read([RESET, written(7, "stopped again")])
+    stopping.read([written(8, "reset", held=False)])
+    assert stopping.stage == (StopState.IDLE, False)
+
+
+def test_of_a_reset_before_the_window_came_nobody_knows_what_was_enabled_since() -> None:
+    stopping = StopProgress()
+    stopping.read([written(5, "stop"), RESET])
+    assert (stopping.stage, stopping.was_ended) == ((StopState.IDLE, False), False)
+    stopping.read([written(7, "stop"), written(8, "reset", held=False, utc_ns=9_000_000_000)])
+    assert (stopping.was_ended, stopping.since_s) == (True, 9.0)
+
+
+def test_a_stop_in_a_journal_that_begins_anew_is_read() -> None:
+    stopping = StopProgress()
+    stopping.read([written(500, "stop"), written(501, "reset", held=False)])
+    stopping.read([written(1, "begun"), written(2, "stop", reason="door")])
+    assert stopping.held
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (Stopped({}, held=True), "no drive answered"),
+        (Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}), "controller gait unreachable"),
+    ],
+)
+def test_a_stop_is_confirmed_by_drives_and_every_controller_or_not_at_all(said: Stopped, why: str) -> None:
+    stopping = StopProgress()
+    old, new = stopping.sent(), stopping.sent()
+    stopping.failed(old, "the link of the one before broke")
+    assert stopping.state is StopState.SENT
+    stopping.answered(new, said)
+    assert (stopping.state, stopping.why) == (StopState.NOT_CONFIRMED, why)
+
+
+def test_the_answer_dates_no_drive_that_has_not_confirmed_the_stop() -> None:
+    stopping = StopProgress()
+    number = stopping.sent(at_ns=0)
+    columns = {"left_knee": ["quick stop active"], "right_knee": ["quick stop active"]}
+    stopping.show([200_000_000], columns, 0)
+    said = Stopped({"left_knee": "confirmed", "right_knee": "unconfirmed"}, held=True)
+    stopping.answered(number, said, at_ns=100_000_000)
+    assert {name: proof.after_ms for name, proof in stopping.proofs.items()} == {
+        "left_knee": 100.0,
+        "right_knee": 200.0,
+    }
