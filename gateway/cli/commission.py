@@ -93,8 +93,8 @@ def _lead(
     except EOFError:
         return _left(draft, "nobody answers any more", 1)
     except MotionEnded as end:
-        if lines is not None and lines.stop_asked:
-            return stop_drives(draft, bench, as_json=True)
+        if face.stop_asked:
+            return stop_drives(draft, bench, as_json=lines is not None)
         return _left(draft, "interrupted", end.status)
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")

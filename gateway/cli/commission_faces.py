@@ -1,9 +1,10 @@
 """The terminal as a face of commissioning: words, lines that are typed, and a STOP."""
 
+import signal
 import time
 from collections.abc import Callable
 
-from gateway.cli.line_input import Typed
+from gateway.cli.line_input import Typed, looks_like_stop
 from gateway.cli.text import say
 from gateway.commission.dialogue import Ask
 from gateway.commission.progress import CommissionStep
@@ -18,6 +19,7 @@ class Terminal:
 
     def __init__(self) -> None:
         self.typed = Typed()
+        self.stop_asked = False
         self._shown = 0.0  # when words of a motion were shown; 0: nothing moves
 
     def stop_wanted(self, show: Callable[[], None]) -> str:
@@ -54,4 +56,8 @@ class Terminal:
         default = f" (Enter: {question.default})" if question.default else ""
         self.over()
         say(f"\n{question.text}{choices}{default}\n> ")
-        return self.typed.line()
+        line = self.typed.line()
+        if looks_like_stop(line):
+            self.stop_asked = True
+            signal.raise_signal(signal.SIGINT)
+        return line

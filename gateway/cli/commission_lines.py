@@ -12,7 +12,6 @@ null}` when that is over.
 import contextlib
 import os
 import queue
-import re
 import select
 import signal
 import sys
@@ -24,6 +23,7 @@ import msgspec
 
 from drivers.errors import DriverError
 from drivers.inbox import Inbox
+from gateway.cli.line_input import looks_like_stop
 from gateway.cli.text import say_json
 from gateway.commission.dialogue import Ask, Live
 from gateway.commission.progress import CommissionStep
@@ -34,8 +34,6 @@ SHOW_S = 0.5  # between two words of a joint that moves
 LIVE_S = 0.2  # between two looks while a question waits; a signal just before a wait is heard after it
 CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
-STOP_WORD = re.compile(r"\bstop\b", re.IGNORECASE)
-OBJECT_MARKS = frozenset("{[\"'")  # before that word: an object that went wrong on its way
 
 
 class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -137,23 +135,14 @@ def _read(text: str) -> Answer:
     except (msgspec.DecodeError, RecursionError):
         found = None
     if not isinstance(found, dict):
-        return Answer(stop=True) if _looks_like_stop(text) else Answer(text)
+        return Answer(stop=True) if looks_like_stop(text) else Answer(text)
     said = [value for key, value in found.items() if key.lower() == "stop"]
-    if any(said) or (not said and "answer" not in found and _looks_like_stop(text)):
+    if any(said) or (not said and "answer" not in found and looks_like_stop(text)):
         return Answer(stop=True)
     try:
         return msgspec.convert(found, Answer) if "answer" in found else Answer(text)
     except msgspec.ValidationError:
         return Answer(text)
-
-
-def _looks_like_stop(text: str) -> bool:
-    """Whether a line that is no answer has the word alone, or as a part of what looks like an object."""
-    word = STOP_WORD.search(text)
-    if word is None:
-        return False
-    before = text[: word.start()]
-    return not OBJECT_MARKS.isdisjoint(before) or not any(map(str.isalnum, before + text[word.end() :]))
 
 
 class JsonFace:
@@ -164,6 +153,10 @@ class JsonFace:
         self._number = 0
         self._steps: tuple[CommissionStep, ...] = ()
         self._moving_s = 0.0  # when words of a motion were told; 0: nothing moves
+
+    @property
+    def stop_asked(self) -> bool:
+        return self._lines.stop_asked
 
     def moving(self, text: str) -> str:
         if time.monotonic() - self._moving_s > SHOW_S:

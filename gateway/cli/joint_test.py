@@ -286,8 +286,8 @@ def _lead(
         return stop_robot(config, benches, as_json=options.json) or 1
     except MotionEnded as end:
         result = "interrupted"
-        if lines is not None and lines.stop_asked:
-            return stop_robot(config, benches, as_json=True) or 1
+        if face.stop_asked:
+            return stop_robot(config, benches, as_json=lines is not None) or 1
         warn("joint-test", f"interrupted; {LEFT}")
         return end.status
     except EOFError:

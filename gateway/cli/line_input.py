@@ -1,11 +1,24 @@
 """Input from a terminal or pipe: lines, and whether some can be read without waiting."""
 
 import os
+import re
 import select
 
 STDIN = 0
 CHUNK = 4096
 TURN_S = 0.2  # of a wait: Python hears a signal that came just before one only after it
+
+STOP_WORD = re.compile(r"\bstop\b", re.IGNORECASE)
+OBJECT_MARKS = frozenset("{[\"'")  # before that word: an object that went wrong on its way
+
+
+def looks_like_stop(text: str) -> bool:
+    """Return whether a line that is no answer has the word alone, or within what looks like an object."""
+    word = STOP_WORD.search(text)
+    if word is None:
+        return False
+    before = text[: word.start()]
+    return not OBJECT_MARKS.isdisjoint(before) or not any(map(str.isalnum, before + text[word.end() :]))
 
 
 class Typed:

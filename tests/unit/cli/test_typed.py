@@ -8,6 +8,8 @@ import pytest
 
 from gateway.cli.commission_faces import Terminal
 from gateway.cli.line_input import Typed
+from gateway.cli.motion_ends import MotionEnded, ending
+from gateway.commission.dialogue import Ask
 
 
 @pytest.fixture
@@ -65,3 +67,15 @@ def test_a_terminal_says_that_it_moves_and_looks_at_the_keys(
     assert face.moving("STOP: Enter") == "STOP was pressed"
     assert "STOP: Enter" in capsys.readouterr().out
     os.close(write)
+
+
+@pytest.mark.parametrize("line", ["stop\n", " STOP!\n", '{"stop"\n'])
+def test_at_a_question_stop_is_no_enter(line: str, pipe: tuple[Typed, int]) -> None:
+    """*Then press Enter* took it for one, and the next joint was powered."""
+    terminal = Terminal()
+    terminal.typed, write = pipe
+    os.write(write, line.encode())
+    os.close(write)
+    with ending(), pytest.raises(MotionEnded):
+        terminal.ask(Ask("Hold the leg. Then press Enter.", press=True))
+    assert terminal.stop_asked
