@@ -56,8 +56,14 @@ def add_robot(made: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         type=address,
         default=USUAL,
-        help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
+        help=f"the gateway to ask, or the path of its Unix socket (default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
+
+
+def again(arguments: argparse.Namespace, command: str) -> str:
+    """Return how to give another command to the same robot."""
+    robot: Address = arguments.robot
+    return f"gwrms {command}" if robot == USUAL else f"gwrms {command} --robot {robot}"
 
 
 def connect(arguments: argparse.Namespace, command: str) -> Robot:
@@ -83,7 +89,7 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
     except Unreachable as error:
         if address != USUAL:
             raise
-        raise Unreachable(f"{error} Another one is asked by --robot HOST:PORT") from error
+        raise Unreachable(f"{error} Another robot: --robot HOST:PORT") from error
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:

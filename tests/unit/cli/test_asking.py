@@ -323,7 +323,7 @@ def test_who_names_no_robot_is_told_how_where_none_answers(
     with FakeRobot() as gone:
         monkeypatch.setattr(connect, "USUAL", Address.parse(gone.address))
     assert main([command]) == 1
-    assert "is it running there? Another one is asked by --robot HOST:PORT" in capsys.readouterr().err
+    assert "is it running there? Another robot: --robot HOST:PORT" in capsys.readouterr().err
 
 
 def test_stop_is_0_only_when_every_drive_has_confirmed(
