@@ -63,3 +63,4 @@ class PredictingState(Struct, frozen=True):
     judged: int = 0  # decisions since the start
     skipped: int = 0  # decisions that were due while too much was to do
     adapting: dict[str, str] = {}  # by robot, in words; "" where there is nothing to say
+    dangers: dict[str, str] = {}  # by robot, in words, where danger is on and something was said
