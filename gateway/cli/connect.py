@@ -19,6 +19,7 @@ from gateway.client import (
     Unreachable,
 )
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
+from gateway.client.keys import named
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
@@ -56,7 +57,8 @@ def add_robot(made: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         type=address,
         default=USUAL,
-        help=f"the gateway to ask, or the path of its Unix socket (default {DEFAULT_HOST}:{DEFAULT_PORT})",
+        help="the gateway to ask; or the path of its Unix socket, or a robot's name in server.toml "
+        f"(default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
 
 
@@ -193,6 +195,6 @@ def parameter_names(description: Description) -> list[str]:
 
 def address(text: str) -> Address:
     try:
-        return Address.parse(text)
+        return named(text) or Address.parse(text)
     except BadAddress as error:
         raise argparse.ArgumentTypeError(str(error)) from error
