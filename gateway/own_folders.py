@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import pwd
 import stat
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
@@ -59,6 +58,8 @@ def _of_session(environ: Mapping[str, str], uid: int) -> Iterator[Path]:
 
 
 def _settings_of(uid: int) -> Iterator[Path]:
+    import pwd  # Windows has none, and no sudo
+
     with contextlib.suppress(KeyError):
         yield Path(pwd.getpwuid(uid).pw_dir, ".config", "gwrms")
 

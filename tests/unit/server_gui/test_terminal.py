@@ -350,7 +350,7 @@ def test_write_whose_answer_was_lost_is_not_known() -> None:
         (lambda _stopped: None, "STOP sent"),
         (
             lambda stopped: stopped.set_result(Stopped({"left_knee": "confirmed"}, True)),
-            "STOP confirmed by all 1 drives",
+            "STOP confirmed by the drive",
         ),
         (
             lambda stopped: stopped.set_result(Stopped({"left_knee": "unreachable"}, True)),
