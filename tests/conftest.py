@@ -173,7 +173,9 @@ def records_of_its_own(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for name in ("state", "data", "config"):
             patch.setenv(f"XDG_{name.upper()}_HOME", str(own / name))
-        patch.delenv("STATE_DIRECTORY", raising=False)
+        for name in ("STATE_DIRECTORY", "XDG_RUNTIME_DIR"):
+            patch.delenv(name, raising=False)
+        patch.setattr("gateway.own_folders.SYSTEM", own / "run" / "gwrms")
         yield
 
 

@@ -19,6 +19,7 @@ from gateway.client import (
     Unreachable,
 )
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
+from gateway.client.keys import named
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
@@ -56,8 +57,15 @@ def add_robot(made: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         type=address,
         default=USUAL,
-        help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
+        help="the gateway to ask; or the path of its Unix socket, or a robot's name in server.toml "
+        f"(default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
+
+
+def again(arguments: argparse.Namespace, command: str) -> str:
+    """Return how to give another command to the same robot."""
+    robot: Address = arguments.robot
+    return f"gwrms {command}" if robot == USUAL else f"gwrms {command} --robot {robot}"
 
 
 def connect(arguments: argparse.Namespace, command: str) -> Robot:
@@ -83,7 +91,7 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
     except Unreachable as error:
         if address != USUAL:
             raise
-        raise Unreachable(f"{error} Another one is asked by --robot HOST:PORT") from error
+        raise Unreachable(f"{error} Another robot: --robot HOST:PORT") from error
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:
@@ -187,6 +195,6 @@ def parameter_names(description: Description) -> list[str]:
 
 def address(text: str) -> Address:
     try:
-        return Address.parse(text)
+        return named(text) or Address.parse(text)
     except BadAddress as error:
         raise argparse.ArgumentTypeError(str(error)) from error

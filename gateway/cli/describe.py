@@ -162,7 +162,8 @@ def _stop(robot: Description) -> str:
 
 def _stop_beyond(stop: StopInfo) -> str:
     """Return whether one is held, and what it does beside the drives' quick stop, in words."""
-    lines = [f"a stop is held: {stop.reason or 'no reason given'}" if stop.held else "no stop is held"]
+    why = f"reason: {stop.reason or 'none given'}"
+    lines = [f"a stop is held ({why}); gwrms reset ends it" if stop.held else "no stop is held"]
     lines += [] if stop.problem is None else [stop.problem]
     for name, why_not in stop.controllers.items():
         what = f"a stop also stops the controller {name}"

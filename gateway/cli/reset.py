@@ -1,27 +1,56 @@
 """`gwrms reset`: ends a held stop."""
 
 from gateway.amounts import NONE
-from gateway.cli.connect import connect, parser
+from gateway.cli.connect import ask, connect, parser
 from gateway.cli.text import say, say_json, table, warn
+from gateway.client import RemoteError, Robot
+from gateway.wire.component import ChannelInfo
 from gateway.wire.stop import Reset
 
 EPILOG = """Each drive is taken to "switch on disabled": a moving one is stopped first, a fault is reset, and
 one that held its position releases it. Nothing is enabled: the controller or gwrms enable does
 that. The stop stays held until every drive is known to be without current, and every controller
-to be stopped; otherwise the reason is named."""
+to be stopped; otherwise the reason is named. Where no stop is held and drives are enabled, the command
+asks first: they lose their power."""
+LOSES = "no stop is held, and enabled are: {}. A reset stops them and takes their power. Go on?"
+ENABLED = "operation enabled"
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms reset`; 0 only when no stop is held any more and every drive is where it should be."""
     made = parser("reset", "End a held stop: every drive switched off, none enabled.", EPILOG)
+    made.add_argument(
+        "--yes", action="store_true", help="do not ask where no stop is held and drives are enabled"
+    )
     arguments = made.parse_args(argv)
     with connect(arguments, "reset") as robot:
+        if (enabled := _enabled(robot)) and not ask(LOSES.format(", ".join(enabled)), yes=arguments.yes):
+            warn("reset", "nothing was done")
+            return 1
         reset = robot.reset()
     if arguments.json:
         say_json(reset)
     else:
         say(_text(reset))
     return _verdict(reset)
+
+
+def _enabled(robot: Robot) -> list[str]:
+    """Return the drives that are enabled while no stop is held; none where that is not known."""
+    description = robot.describe()
+    if description.stop.held:
+        return []
+    joints = {one.name for one in description.components if one.kind == "joint"}
+    states = [one for one in description.channels if one.component in joints and one.quantity == "state"]
+    try:
+        values = robot.components(*(one.name for one in states)).values if states else {}
+    except RemoteError:  # a reset enables nothing, whatever they are
+        return []
+    return [one.component for one in states if _word(one, values.get(one.name)) == ENABLED]
+
+
+def _word(channel: ChannelInfo, value: float | None) -> str | None:
+    return channel.enum.get(f"{value:.0f}") if value is not None and channel.enum else None
 
 
 def _text(reset: Reset) -> str:

@@ -1,6 +1,6 @@
 """`gwrms stop`: quick stop on every drive."""
 
-from gateway.cli.connect import connect, parser
+from gateway.cli.connect import again, connect, parser
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import ClientError
 from gateway.wire.stop import Stopped
@@ -29,14 +29,14 @@ def main(argv: list[str]) -> int:
     if arguments.json:
         say_json(stopped)
     else:
-        say(_text(stopped))
+        say(_text(stopped, again(arguments, "reset")))
     return _verdict(stopped)
 
 
-def _text(stopped: Stopped) -> str:
+def _text(stopped: Stopped, reset: str) -> str:
     outcomes = {**stopped.drives, **stopped.controllers}
     rows = [(name, outcome, stopped.fallbacks.get(name, "")) for name, outcome in outcomes.items()]
-    held = "The stop is held until it is reset (gwrms reset).\n" if stopped.held else ""
+    held = f"The stop is held until it is reset ({reset}).\n" if stopped.held else ""
     return table(("DRIVE", "STOP", ""), rows) + f"\n{held}{WARNING}\n"
 
 

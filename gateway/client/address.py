@@ -44,6 +44,9 @@ class Address:
             raise BadAddress(f"an address is missing; write HOST:PORT, such as {DEFAULT_HOST}:{DEFAULT_PORT}")
         if "/" in text:
             return cls(text, 0)
+        if text.isdigit() or text.endswith(".sock"):
+            meant = f":{text}, a port of this computer" if text.isdigit() else f"./{text}, a path"
+            raise BadAddress(f"{text!r} is not a robot's address; write {meant}, if that is meant")
         host, colon, port = text.rpartition(":") if not text.endswith("]") else (text, "", "")
         if not colon:
             host, port = (text, "")

@@ -66,6 +66,15 @@ def pin_of(address: Address) -> str | None:
     return pin
 
 
+def named(name: str) -> Address | None:
+    """Return the address of a robot that the server's file calls so; None too where that cannot be read."""
+    try:
+        entry = tomllib.loads(server_file().read_text(encoding="utf-8"))["robots"][name]
+        return Address.parse(entry if isinstance(entry, str) else entry["address"])
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return None
+
+
 def pins() -> set[str]:
     """Return the pins of all paired robots; raises `OSError` or `ValueError` on a bad file."""
     return {pin for pin, _ in _robots(server_file())}

@@ -20,6 +20,7 @@ from gateway.client.errors import (
     ClientError,
     LinkLost,
     NotConnected,
+    NotPaired,
     ProtocolError,
     RemoteError,
 )
@@ -267,7 +268,7 @@ class Link:
         """
         try:
             connection, hello = await self._greet(self.address)
-        except LinkLost:
+        except (LinkLost, NotPaired):
             if (local := await self._greet_locally()) is None:
                 raise
             connection, hello = local

@@ -37,7 +37,7 @@ def _which(draft: Draft, others: Mapping[int, NodeAnswers]) -> Talk[int | None]:
         "Which node commands the drives, so that a STOP can tell it too? "
         f"Beside the drives here are: {names or 'no others'}. {NONE}: not a CAN node, or not connected",
         (*map(str, sorted(others)), NONE),
-        NONE,
+        None if others else NONE,  # Enter alone must not leave a controller out of every STOP
     )
     if choice == NONE:
         yield Say(

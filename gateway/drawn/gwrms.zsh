@@ -188,7 +188,7 @@ _shtab_gwrms_defaults_added=0
 
 _shtab_gwrms_ab_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--pairs[of A and B, 8 to 14 (default 10)]:N:"
   "--seed[seed of the order (default\: random)]:N:"
@@ -207,7 +207,7 @@ _shtab_gwrms_ab_defaults_added=0
 
 _shtab_gwrms_bench_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--requests[requests of each kind (default\: 200)]:requests:"
 )
@@ -217,7 +217,7 @@ _shtab_gwrms_bench_defaults_added=0
 
 _shtab_gwrms_blame_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--seconds[duration (default\: until Ctrl-C)]:seconds:"
 )
@@ -473,7 +473,7 @@ _shtab_gwrms_completion_defaults_added=0
 
 _shtab_gwrms_cost_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--seconds[duration (default\: 2)]:seconds:"
 )
@@ -496,7 +496,7 @@ _shtab_gwrms_demo_defaults_added=0
 
 _shtab_gwrms_describe_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
 )
 
@@ -562,7 +562,7 @@ _shtab_gwrms_eds_defaults_added=0
 
 _shtab_gwrms_enable_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "(*)::names or globs (default\: all):"
 )
@@ -594,7 +594,7 @@ _shtab_gwrms_gateway_defaults_added=0
 
 _shtab_gwrms_get_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--deg[show angles in degrees, not in rad\; JSON stays in SI]"
   "(*)::names, addresses, globs, or a component (default\: all writable ones):"
@@ -736,7 +736,7 @@ _shtab_gwrms_journal_defaults_added=0
 
 _shtab_gwrms_journal_tail_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "-n[number of entries, at most 1000 (default 20)]:N:"
 )
@@ -943,7 +943,7 @@ _shtab_gwrms_models_show_defaults_added=0
 
 _shtab_gwrms_od_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--read[read the values from the device]"
   "--watch[print a line for every change, until Ctrl-C]"
@@ -980,7 +980,7 @@ _shtab_gwrms_params_defaults_added=0
 
 _shtab_gwrms_params_apply_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
   "--yes[do not ask for confirmation]"
@@ -994,7 +994,7 @@ _shtab_gwrms_params_apply_defaults_added=0
 
 _shtab_gwrms_params_compare_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
   ":a .toml or .dcf file:_files"
@@ -1005,7 +1005,7 @@ _shtab_gwrms_params_compare_defaults_added=0
 
 _shtab_gwrms_params_save_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
   "--eds[the device\'s file, to make a DCF from]:EDS:_files"
@@ -1019,7 +1019,7 @@ _shtab_gwrms_params_save_defaults_added=0
 
 _shtab_gwrms_plot_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--terminal[use the terminal even with a display]"
   "--seconds[end after N seconds]:N:"
   "(*):names, globs, or a component\: all of its channels:"
@@ -1061,8 +1061,9 @@ _shtab_gwrms_query_defaults_added=0
 
 _shtab_gwrms_reset_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
+  "--yes[do not ask where no stop is held and drives are enabled]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1070,7 +1071,7 @@ _shtab_gwrms_reset_defaults_added=0
 
 _shtab_gwrms_restore_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--yes[do not ask for confirmation]"
   ":a joint or device, such as left_knee:"
@@ -1237,7 +1238,7 @@ _shtab_gwrms_sessions_show_defaults_added=0
 
 _shtab_gwrms_set_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--mirror[also set the same joint of the other side]"
   "--all-joints[set every joint]"
@@ -1322,7 +1323,7 @@ _shtab_gwrms_sim_run_defaults_added=0
 
 _shtab_gwrms_snapshot_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--sort[default\: cpu]:sort:(cpu memory name pid)"
   "--ascending[descending]"
@@ -1338,7 +1339,7 @@ _shtab_gwrms_snapshot_defaults_added=0
 
 _shtab_gwrms_stop_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--reason[reason for the robot\'s journal]:reason:"
 )
@@ -1348,7 +1349,7 @@ _shtab_gwrms_stop_defaults_added=0
 
 _shtab_gwrms_store_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--all[every device that can store, one after another]"
   ":a joint or device, such as left_knee:"
@@ -1359,7 +1360,7 @@ _shtab_gwrms_store_defaults_added=0
 
 _shtab_gwrms_sweep_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--cycles[gait cycles that each value is held for (default 6)]:N:"
   "--transient[gait cycles left out after each change (default 2)]:N:"
@@ -1378,7 +1379,7 @@ _shtab_gwrms_sweep_defaults_added=0
 
 _shtab_gwrms_top_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--seconds[end after N seconds]:N:"
 )
 
@@ -1426,7 +1427,7 @@ _shtab_gwrms_train_defaults_added=0
 
 _shtab_gwrms_watch_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
   "--rate[ticks a second, 0.1 to 1000 (default 10)]:HZ:"
   "--csv[print comma-separated values, a column per channel\; missing ones are empty]"

@@ -200,6 +200,7 @@ def _predicted(state: PredictingState | None) -> list[str]:
         *([] if state.labelled is None else [_labelled(state.labelled)]),
         *skipped,
         *(f"{robot}: {text}\n" for robot, text in state.adapting.items() if text),
+        *(f"{robot}: danger: {text}\n" for robot, text in state.dangers.items()),
         *(f"{one}\n" for one in state.problems),
     ]
 

@@ -103,6 +103,11 @@ def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> N
     assert line.detail == "right 94 % last week (312 checked) · else turn 4 %"
     assert line.short == "right 94 % last week"
     assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled" in line.tip
+    few = dataclasses.replace(predicted("walk", WALKS), quality=Quality(10, 10, 0, 0, {}))
+    station.take_prediction(few)
+    line = activity(station)
+    assert line.short == "right 10 of 10 last week", "a hundred percent of ten looks known"
+    assert "10 of 10 right, 0 of 10 wrong" in line.tip
 
 
 @pytest.mark.parametrize(

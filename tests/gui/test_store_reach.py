@@ -9,7 +9,7 @@ import pytest
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
-from server_gui.core.archive.library import Found, Library
+from server_gui.core.archive.library import Library, Listing
 from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import By, Recording
@@ -212,10 +212,10 @@ def test_a_knock_that_is_asked_for_while_another_one_is_under_way_is_made_after_
     """And of a list that is damaged no first file is asked."""
     made, came = list[str](), list[Callable[[], None]]()
 
-    def seen(what: str, problem: str | None) -> Callable[[ServerSettings], Found]:
-        def look(_settings: ServerSettings) -> Found:
+    def seen(what: str, problem: str | None) -> Callable[[ServerSettings], Listing]:
+        def look(_settings: ServerSettings) -> Listing:
             made.append(what)
-            return Found(problem=problem)
+            return Listing(problem=problem)
 
         return look
 
@@ -237,7 +237,7 @@ def test_a_knock_that_is_asked_for_while_another_one_is_under_way_is_made_after_
 def test_of_a_look_that_fails_by_a_mistake_of_ours_the_store_is_not_called_reached(
     settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(_settings: ServerSettings) -> Found:
+    def fails(_settings: ServerSettings) -> Listing:
         raise KeyError("a mistake of ours")
 
     monkeypatch.setattr(library, "look", fails)

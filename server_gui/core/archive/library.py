@@ -26,7 +26,7 @@ LIST_S: Final = 300.0  # between looks while nobody looks
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Listing:
     """Sessions of store and spool; `problem` is the reason, in words, if the store's part is missing."""
 
     sessions: tuple[Session, ...] = ()  # newest first
@@ -44,7 +44,7 @@ class Library:
         """`reach` is told what each look says of the store."""
         self.settings = settings
         self.reach = reach or StoreReach()
-        self.found = Found()
+        self.found = Listing()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
         self.reading = Background("store")
@@ -102,7 +102,7 @@ class Library:
         url = self.settings.store.url
         return self.reading.do(lambda: usage.below(Store.existing(url), folder))
 
-    def _looked(self, found: Found) -> None:
+    def _looked(self, found: Listing) -> None:
         self._looking, self.looked_s = False, time.monotonic()
         if (found.sessions, found.usage, found.problem) != (
             self.found.sessions,
@@ -116,26 +116,26 @@ class Library:
         self._reached(found)
 
     def _failed(self, error: Exception) -> None:
-        self._looked(Found(problem=f"internal error, {type(error).__name__}", is_reached=False))
+        self._looked(Listing(problem=f"internal error, {type(error).__name__}", is_reached=False))
 
-    def _knocked(self, found: Found) -> None:
+    def _knocked(self, found: Listing) -> None:
         self._knocking = False
         self._reached(found)
 
     def _knock_failed(self, error: Exception) -> None:
-        self._knocked(Found(problem=f"internal error, {type(error).__name__}", is_reached=False))
+        self._knocked(Listing(problem=f"internal error, {type(error).__name__}", is_reached=False))
 
-    def _reached(self, found: Found) -> None:
+    def _reached(self, found: Listing) -> None:
         self.reach.looked(None if found.is_reached else found.problem, is_empty=found.is_empty)
         again, self._knock_again = self._knock_again, False
         if again:
             self.knock(now=True)
 
 
-def look(settings: ServerSettings) -> Found:
+def look(settings: ServerSettings) -> Listing:
     """Return what there is now; blocks."""
     waiting, store = _waiting(settings), _opened(settings)
-    if isinstance(store, Found):
+    if isinstance(store, Listing):
         here = waiting if store.problem is None else spool_reader.with_store_away(waiting)
         return replace(store, sessions=_joined([], here))
     try:
@@ -143,25 +143,25 @@ def look(settings: ServerSettings) -> Found:
         used = tuple(usage.by_robot(store))
         size_bytes = sum(each.size_bytes for each in store.objects.listing())
     except StoreError as error:
-        return Found(_joined([], spool_reader.with_store_away(waiting)), problem=str(error))
-    return Found(_joined(stored, waiting), used, size_bytes)
+        return Listing(_joined([], spool_reader.with_store_away(waiting)), problem=str(error))
+    return Listing(_joined(stored, waiting), used, size_bytes)
 
 
-def knock(settings: ServerSettings) -> Found:
+def knock(settings: ServerSettings) -> Listing:
     """Return only whether the store is reached; blocks."""
     store = _opened(settings)
-    return store if isinstance(store, Found) else Found()
+    return store if isinstance(store, Listing) else Listing()
 
 
-def _opened(settings: ServerSettings) -> Store | Found:
+def _opened(settings: ServerSettings) -> Store | Listing:
     """Return the store, of which one small file has been read; else why there is none."""
     try:
         return Store.existing(settings.store.url)
     except NoSuchTable:
         gone = _gone(settings)
-        return Found(problem=gone, is_empty=gone is None, is_reached=gone is None)
+        return Listing(problem=gone, is_empty=gone is None, is_reached=gone is None)
     except StoreError as error:
-        return Found(problem=str(error), is_reached=False)
+        return Listing(problem=str(error), is_reached=False)
 
 
 def _gone(settings: ServerSettings) -> str | None:

@@ -11,7 +11,7 @@ from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
-from server_gui.core.prediction.state import Quality
+from server_gui.core.prediction.state import FEW, Quality
 
 NOT_SEEN: Final = ("lost", "stale")
 SOURCES: Final = {
@@ -68,8 +68,9 @@ def blind(station: Station) -> str:
 
 
 def _checked(quality: Quality) -> tuple[str, ...]:
-    right = 100 * quality.right / quality.labelled
-    short = f"right {right:.0f} % last week"
+    if quality.labelled < FEW:
+        return (f"right {quality.right} of {quality.labelled} last week",)
+    short = f"right {100 * quality.right / quality.labelled:.0f} % last week"
     return f"{short} ({quality.labelled} checked)", short
 
 

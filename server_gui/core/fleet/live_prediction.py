@@ -67,6 +67,7 @@ class RecordedPrediction(PredictionService):
     def _note(self, one: Endangered) -> None:
         before, self._levels[one.robot] = self._levels.get(one.robot, Level.NONE), one.verdict.level
         if (happened := turn(before, one.verdict)) is not None:
+            log.warning("%s: %s", one.robot, happened)
             told = {"level": one.verdict.level.word, "number": one.verdict.number}
             self._recorder.event(one.robot, EventKind.DANGER, happened, stamp=one.verdict.stamp_ns, **told)
 

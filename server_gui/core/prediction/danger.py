@@ -30,6 +30,7 @@ class DangerWatch:
         self._calibration = calibration
         self._rules = [PredictionRule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
         self._told: DangerVerdict | None = None
+        self.text = ""  # the newest, in words
         self.restart()
 
     def restart(self) -> None:
@@ -62,7 +63,7 @@ class DangerWatch:
             or before.level is not verdict.level
             or not 0 <= verdict.stamp_ns - before.stamp_ns < TELLS_NS
         ):
-            self._told = verdict
+            self._told, self.text = verdict, said.text
             yield said
 
 

@@ -49,7 +49,7 @@ class Endangered:
         """In words: the level, the number, who speaks, and why."""
         verdict = self.verdict
         if verdict.number is None:
-            return "unknown: no detector has what it needs"
+            return "unknown: its detectors lack data, or learn what is usual (half a minute and more)"
         speak = f"{verdict.speaking} of {len(DETECTORS)} detectors speak"
         return "; ".join([f"{verdict.level.word}, {verdict.number:.2f}, {speak}", *verdict.why])
 

@@ -117,6 +117,11 @@ class RobotPredictor:
         self._served = serves
         return serves
 
+    @property
+    def danger(self) -> str:
+        """What was said of danger last, in words; empty where it is off, or nothing was said yet."""
+        return "" if self._danger is None else self._danger.text
+
     def restart(self) -> None:
         """Forget everything seen until now."""
         for task in self.tasks.values():

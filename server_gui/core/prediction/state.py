@@ -6,6 +6,7 @@ from typing import Final
 from msgspec import Struct
 
 WITHIN_DAYS: Final = 7  # of predictions that are compared with labels
+FEW: Final = 30  # decisions, of which a percentage would look as if it were known
 
 
 class Quality(Struct, frozen=True):
@@ -19,11 +20,13 @@ class Quality(Struct, frozen=True):
 
     @property
     def shares(self) -> tuple[str, str, str]:
-        """Right, wrong and not said, in percent."""
-        right, wrong, unsaid = (
-            100 * count / self.labelled for count in (self.right, self.wrong, self.unsaid)
-        )
-        return f"{right:.1f} %", f"{wrong:.1f} %", f"{unsaid:.1f} %"
+        """Right, wrong and not said: in percent, or counts where there are too few decisions for that."""
+        counts = (self.right, self.wrong, self.unsaid)
+        if self.labelled < FEW:
+            right, wrong, unsaid = (f"{count} of {self.labelled}" for count in counts)
+        else:
+            right, wrong, unsaid = (f"{100 * count / self.labelled:.1f} %" for count in counts)
+        return right, wrong, unsaid
 
     @property
     def text(self) -> str:
@@ -60,3 +63,4 @@ class PredictingState(Struct, frozen=True):
     judged: int = 0  # decisions since the start
     skipped: int = 0  # decisions that were due while too much was to do
     adapting: dict[str, str] = {}  # by robot, in words; "" where there is nothing to say
+    dangers: dict[str, str] = {}  # by robot, in words, where danger is on and something was said

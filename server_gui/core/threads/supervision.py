@@ -94,7 +94,7 @@ class Worker:
                 return Trouble(self.name, text, works=False)
             self.start()
         if now_s - self._beat_s > self._still_s:
-            still = f"the part “{self.name}” has not moved for {self._still_s:g} s"
+            still = f"the part “{self.name}” has not moved for more than {self._still_s:g} s"
             return Trouble(self.name, f"{still}; is this computer too busy?", works=False)
         if self._deaths and now_s - self._died_s < HELD_S:
             text = f"the part “{self.name}” stopped unexpectedly and was restarted {self._why}"

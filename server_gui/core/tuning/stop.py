@@ -126,7 +126,7 @@ class StopProgress:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
-            self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
+            self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def failed(self, number: int, reason: str) -> None:
         """Note that nobody answered: consider the robot not stopped."""
@@ -193,7 +193,7 @@ class StopProgress:
             if drive not in self.proofs:
                 self._prove(drive, stamps_ns, words, offset_ns, self.at_ns)
         if self.state is StopState.CONFIRMED:
-            self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
+            self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def _prove(
         self, drive: str, stamps_ns: Sequence[int], words: Sequence[str | None], offset_ns: int, at_ns: int
@@ -214,6 +214,10 @@ class StopProgress:
     @property
     def _slowest_ms(self) -> float:
         return max([1.0, *(proof.after_ms for proof in self.proofs.values())])
+
+    @property
+    def every_drive(self) -> str:
+        return "the drive" if self.drives == 1 else f"all {self.drives} drives"
 
     def timed(self, confirmed: str) -> str:
         """Return the confirmation with its time: the slowest drive's, or the answer's if rows lack one."""

@@ -7,6 +7,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
+from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.robot_alarms import remedy
 from server_gui.core.desk.desk import Desk
@@ -169,7 +170,7 @@ def _outcome(station: Station) -> Words:
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
-        StopState.CONFIRMED: (stopping.timed(f"{stopping.drives} drives"),),
+        StopState.CONFIRMED: (stopping.timed(counted(stopping.drives, "drive")),),
         StopState.NOT_CONFIRMED: (remedy(station.robot).partition(",")[0],),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)

@@ -305,7 +305,8 @@ class JointTable(QTableView):
             if sum(widths[known] for known in shown) <= room:
                 break
         least = (ANGLE, ERROR) if self._model.errors else (ERROR, ANGLE)  # errors stand below the table, too
-        for column in (TORQUE, STOP, *least) if self._model.is_stop_news else (TORQUE, *least):
+        last = (STOP,) if self._model.is_stop_news else ()  # the proof of a STOP goes after all else
+        for column in (TORQUE, *least, *last):
             if sum(widths[known] for known in shown) > room:
                 shown.discard(column)
         if sum(widths[known] for known in shown) + widths[ERROR] <= room:

@@ -320,17 +320,17 @@ def facts_text(session: Session | None, tape: Tape | None, problem: str, held: S
     elif tape is None:
         lines += ["", "looking into it …"]
     else:
-        lines += ["", *_inside(tape)]
+        lines += ["", *_inside(tape, is_partial=away)]
     return "\n".join([*lines, *(["", "Parameters when it began:", *held] if held else [])])
 
 
-def _inside(tape: Tape) -> list[str]:
+def _inside(tape: Tape, *, is_partial: bool) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
     head = f"{length} of {len(tape.units)} channels"
-    if tape.is_partial:
+    if is_partial:
         head = f"{head}: {PARTIAL}"
     if not tape.events:
-        return [head] if tape.is_partial else [head, "It has no gaps and no marks."]
+        return [head] if is_partial else [head, "It has no gaps and no marks."]
     return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
 
 

@@ -23,6 +23,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.missing_pdos import told_percent
 from server_gui.core.processing.bus_health import (
+    ACTIVE,
     BUSY_PERCENT,
     FULL_PERCENT,
     BusHealthLevel,
@@ -159,7 +160,7 @@ class BusCard(Card):
         self._bar.show_load(bus.load_percent, _colour_of(bus.load_percent or 0.0) if live else "old")
         set_tone(self.load, "" if live else "old")
         self.set_title(f"Bus {bus.name}")
-        self.set_note(bus.state)
+        self.set_note(f"{bus.state} (normal)" if live and bus.state == ACTIVE else bus.state)
         frames = "–" if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
         text, wrong = css(self._theme, "text"), css(self._theme, "warn")
         counters = [(text, "", f"{frames} frames/s")]

@@ -5,13 +5,31 @@ import json
 import pytest
 
 from gateway.main import main
-from tests.fake_robot import FakeRobot, Refusal
+from tests.fake_robot import STATES, FakeRobot, Refusal
 
 DOWN, UP = "switch on disabled", "operation enabled"
 
 
 def run(robot: FakeRobot, *arguments: str) -> int:
     return main([*arguments, "--robot", robot.address])
+
+
+def test_drives_that_are_enabled_while_no_stop_is_held_lose_no_power_unasked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The advice after a stop of another robot was followed here, and this one walked."""
+    monkeypatch.setitem(STATES, 5, UP)
+    with FakeRobot() as robot:
+        robot.overrides["robot.reset"] = lambda _params: {
+            "drives": {"left_knee": DOWN},
+            "problems": {},
+            "held": False,
+        }
+        assert run(robot, "reset") != 0
+        assert "no terminal to ask on" in capsys.readouterr().err
+        assert robot.called("robot.reset") == []
+        assert run(robot, "reset", "--yes") == 0
+        assert len(robot.called("robot.reset")) == 1
 
 
 def test_a_reset_takes_the_lease_and_says_that_no_stop_is_held(capsys: pytest.CaptureFixture[str]) -> None:
@@ -23,7 +41,7 @@ def test_a_reset_takes_the_lease_and_says_that_no_stop_is_held(capsys: pytest.Ca
         }
         assert run(robot, "reset") == 0
         called = [method for method, _ in robot.calls]
-    assert [one for one in called if one.startswith(("control.", "robot."))] == [
+    assert [one for one in called if one.startswith(("control.", "robot.reset"))] == [
         "control.acquire",
         "robot.reset",
         "control.release",

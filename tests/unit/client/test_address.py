@@ -20,7 +20,8 @@ def test_address_is_read(text: str, host: str, port: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "host:0", "host:65536", "host:port", "::1", "fe80::1:7000", "host:-1", "host:٣"]
+    "text",
+    ["", "host:0", "host:65536", "host:port", "::1", "fe80::1:7000", "host:-1", "host:٣", "7520", "exo.sock"],
 )
 def test_wrong_address_says_what_to_write(text: str) -> None:
     with pytest.raises(BadAddress, match="write"):

@@ -13,9 +13,9 @@ import pytest
 
 from gateway import own_folders
 from gateway.cli import serve
-from gateway.client import Address, LinkLost, LinkSettings, Robot, Unreachable, WrongRobot
+from gateway.client import Address, LinkLost, LinkSettings, NotPaired, Robot, Unreachable, WrongRobot
 from gateway.client.keys import keys_folder
-from gateway.client.local_sockets import listens_at, local_sockets
+from gateway.client.local_sockets import listens_at, local_sockets, sockets_instead
 from gateway.connections.listeners import listen_locally
 from gateway.main import main
 from tests.unit.gateway import keyed as keys
@@ -118,8 +118,33 @@ def test_a_paired_robot_is_never_asked_at_a_socket(address: Address, folder: Pat
 def test_another_robot_does_not_stand_in_for_one_whose_gateway_is_off(address: Address, folder: Path) -> None:
     """It has the same port of another host; a stop would be confirmed by drives that nobody meant."""
     elsewhere = Address("127.0.0.9", address.port)
-    with pytest.raises(Unreachable, match=rf"no gateway at 127\.0\.0\.9.*--robot {folder}/exo-test\.sock"):
+    with pytest.raises(
+        Unreachable, match=rf"no gateway at 127\.0\.0\.9.* served at {folder}/exo-test\.sock: is"
+    ):
         Robot(elsewhere, ONCE)
+
+
+def test_a_socket_that_a_killed_gateway_has_left_is_not_offered(folder: Path) -> None:
+    folder.mkdir(parents=True)
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(str(folder / "stale.sock"))
+        assert sockets_instead(Address("127.0.0.9")) == ""
+
+
+def test_an_address_of_the_network_that_is_this_computer_s_leads_to_its_socket_too(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said that nothing is said to another computer in plain."""
+    monkeypatch.setattr("gateway.client.keys.is_loopback", lambda _address: False)
+    monkeypatch.setattr("gateway.client.local_sockets.is_loopback", lambda _address: False)
+    monkeypatch.setattr("gateway.modules.component.module.assemble", Bench().assemble)
+    robot = config(keyed(tmp_path))
+    with serving(robot, local=serve._local(robot)) as (host, port), Robot(Address(host, port), ONCE) as found:
+        assert found.hello is not None
+        assert found.hello.robot == "exo-test"
+        assert folder.is_dir()
+    with pytest.raises(NotPaired, match=r"192\.0\.2\.7:7420 is not paired"):
+        Robot(Address("192.0.2.7"), ONCE)
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,8 @@ def test_while_the_store_is_away_the_rest_of_a_session_is_not_called_lost(
     assert "no gaps" not in said
     here = ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))
     assert not Tape.open(here, shown).is_partial, "nothing was uploaded yet, so all of it is here"
+    said = facts_text(shown, Tape.open(here, shown), "", ())
+    assert "no gaps" not in said, "of what was listed while the store was away, nobody knows all"
 
 
 def _row(session: Session) -> Record:
