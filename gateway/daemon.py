@@ -84,6 +84,7 @@ class Daemon:
             folder,
             self._complain,
             lambda: self._loop.post(self._left),
+            robot=config.path,
             rested_without_keys=rested_without_keys,
         )
         self._known: KnownClients | None = None  # at the last look, while a client is authenticated

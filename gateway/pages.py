@@ -1,5 +1,6 @@
 """The pages of the docs: as they were installed, or as they lie in a working copy."""
 
+import re
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +28,19 @@ def find(name: str) -> Path | None:
     by_last = {page.rpartition("/")[2]: path for page, path in known.items()}
     wanted = name.removeprefix("docs/").removesuffix(".md")
     return known.get(wanted) or by_last.get(wanted)
+
+
+def about(words: str) -> list[str]:
+    """Return the names of the pages whose titles have these words, or else one of them."""
+    wanted = set(_words(words))
+    found = {name: len(wanted & set(_words(title(page)))) for name, page in pages().items()}
+    most = max(found.values(), default=0)
+    likely = [name for name, count in found.items() if count == most > 0]
+    return [name for name in likely if not name.startswith("adr/")] or likely  # a decision is rarely meant
+
+
+def _words(text: str) -> list[str]:
+    return re.findall(r"[a-z0-9]{3,}", text.lower())
 
 
 def title(page: Path) -> str:

@@ -2,6 +2,8 @@
 
 import argparse
 import sys
+import time
+from collections.abc import Callable
 from typing import Final
 
 from gateway.cli.connect import NobodyToAsk
@@ -20,6 +22,7 @@ server.toml; a person at the robot decides what this desk may do. From then on e
 and scripts reach the robot by its address, as before.
 """
 _MOST: Final = 1024  # letters of a line that is typed
+_REFUSED_S: Final = 1.0  # a wrong code is refused at once; for a right one a person is waited for
 
 
 def main(argv: list[str]) -> int:
@@ -54,9 +57,10 @@ def main(argv: list[str]) -> int:
         where, code = _typed(arguments)
     except ValueError as error:
         made.error(str(error))
-    if not arguments.json:
-        say(f"Waiting until somebody confirms it on the robot at {where} …\n")
-    paired = pairing.pair(where, code, arguments.name)
+    if arguments.json:
+        paired = pairing.pair(where, code, arguments.name)
+    else:
+        paired = pairing.pair(where, code, arguments.name, _waiting(where))
     name = pairing.pin(paired.robot, paired.address)
     if arguments.json:
         say_json(
@@ -74,6 +78,20 @@ def main(argv: list[str]) -> int:
     say("If it had no keys before, start its gateway again there first. Then, here:\n")
     say(f"\n  gwrms describe --robot {paired.address}\n")
     return 0
+
+
+def _waiting(where: Address) -> Callable[[], bool]:
+    """Say once that a person is waited for; returned to be asked whether the pairing is given up: never."""
+    begun_s, said = time.monotonic(), False
+
+    def look() -> bool:
+        nonlocal said
+        if not said and time.monotonic() - begun_s > _REFUSED_S:
+            said = True
+            say(f"Waiting until somebody confirms it on the robot at {where} …\n")
+        return False
+
+    return look
 
 
 def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:

@@ -66,6 +66,15 @@ def _about_host(config: RobotConfig) -> Iterator[Finding]:
         yield warning("[gateway]", "host", text)
 
 
+def _about_socket(config: RobotConfig) -> Iterator[Finding]:
+    if config.gateway.socket == "" and AccessFolder(config.access).has_keys:
+        text = (
+            "is empty, and this robot has keys: nobody on its own computer can stop it without a key; leave "
+            "the key out, or name a socket"
+        )
+        yield warning("[gateway]", "socket", text)
+
+
 def _about_controller(config: RobotConfig) -> Iterator[Finding]:
     commanded = config.gateway.role is Role.OBSERVER and config.joint
     if commanded and not config.stop.controller:
@@ -208,6 +217,7 @@ def _about_parameters(config: RobotConfig) -> Iterator[Finding]:
 _CHECKS = (
     _about_names,
     _about_host,
+    _about_socket,
     _about_controller,
     _about_stop_times,
     _about_buses,

@@ -3,6 +3,7 @@
 import logging
 import socket
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gateway.access.folder import AccessFolder
@@ -32,9 +33,12 @@ class Authentication:
         complain: Callable[[str, str], object],
         finished: Callable[[], object],
         *,
+        robot: Path,
         rested_without_keys: bool = False,
     ) -> None:
         """`complain` of an address, and `finished` after each handshake, are called in any thread.
+
+        `robot` is the robot's file, for messages.
 
         Raises:
             UnsafeListener: one of these sockets must not be served.
@@ -48,7 +52,7 @@ class Authentication:
         self._accounts: Accounts | None = None
         self._admit: Admit = _nobody
         self.has_keys = has_keys_at_start(now=folder.has_keys, rested_without=rested_without_keys)
-        kinds = {one: kind_of(one, has_keys=self.has_keys) for one in listeners}
+        kinds = {one: kind_of(one, has_keys=self.has_keys, robot=robot) for one in listeners}
         self._handshakes = self._made(finished) if ListenerKind.TLS in kinds.values() else None
         came = {
             ListenerKind.PLAIN: self._came_plainly,

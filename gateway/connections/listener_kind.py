@@ -11,6 +11,7 @@ until the gateway is started again. There are no keys before the first desk is a
 
 import socket
 from enum import Enum
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 _LOOPBACK: Final = ("127.", "::ffff:127.")
@@ -45,8 +46,8 @@ def has_keys_at_start(*, now: bool, rested_without: bool) -> bool:
     return now and not rested_without
 
 
-def kind_of(listener: socket.socket, *, has_keys: bool) -> ListenerKind:
-    """Return the kind of a listener, from its address, no matter who opened it.
+def kind_of(listener: socket.socket, *, has_keys: bool, robot: Path) -> ListenerKind:
+    """Return the kind of a listener, from its address, no matter who opened it; `robot` is the robot's file.
 
     Raises:
         UnsafeListener: it must not be served.
@@ -57,7 +58,7 @@ def kind_of(listener: socket.socket, *, has_keys: bool) -> ListenerKind:
     if has_keys:
         return ListenerKind.TLS
     if not is_loopback(listener.getsockname()):
-        raise UnsafeListener(without_keys(said(listener.getsockname())))
+        raise UnsafeListener(without_keys(said(listener.getsockname()), robot))
     return ListenerKind.PLAIN
 
 
@@ -70,11 +71,11 @@ def check_classic(listener: socket.socket) -> None:
         )
 
 
-def without_keys(where: str) -> str:
+def without_keys(where: str, robot: Path) -> str:
     """Return why a robot without keys is not served to other computers, and the remedy."""
     return (
         f"this robot has no keys, and {where} is open to other computers: nothing is served now. To admit a "
-        "desk, run `gwrms keys pair ROBOT.toml` here, which shows a code, and `gwrms pair HOST:PORT` on the "
+        f"desk, run `gwrms keys pair {robot}` here, which shows a code, and `gwrms pair HOST:PORT` on the "
         'desk; then start the gateway again. To serve this computer alone, set host = "127.0.0.1"'
     )
 

@@ -36,12 +36,12 @@ NOTHING: Final = (
 )
 EXPLAINED: Final = """
 The difference is the edit's: without a slow drift, and at equal speed; its interval holds in 95 of 100 edits.
-The size is the difference in standard deviations of single cycles. A word needs both: a difference that is
+The size is the difference in standard deviations of single cycles. A verdict needs both: a difference that is
 sure although many metrics were looked at, and one that is large enough to matter.
 """
 EXPLAINED_AB: Final = """
 Before is A, after is B. The difference is that of the pairs, tested by all orders that might have been drawn:
-no drift, straight or bent, is taken for it. A word needs a difference that is sure, and large enough.
+no drift, straight or bent, is taken for it. A verdict needs a difference that is sure, and large enough.
 """
 
 

@@ -212,7 +212,7 @@ def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
             return 1
         _follow(run, followed, ending_, arguments)
         # Its last words have their time: a lease that is given back ends what else may be on trial.
-    told = result(run, followed.station.who, unit)
+    told = result(run, followed.station.who or "this desk", unit)
     if told is not None:
         _keep(told, arguments, command)
     _say_result(run, told, arguments, command)

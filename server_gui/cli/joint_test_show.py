@@ -62,7 +62,7 @@ def _page(shown: AnalysedTest, last: AnalysedTest | None) -> Iterator[str]:
     known = {} if last is None else {one.name: one for one in last.result.measures}
     rows = [(one.name, _number(one), one.unit, _number(known.get(one.name))) for one in shown.result.measures]
     yield table(("MEASURE", "VALUE", "UNIT", "LAST"), rows, right=(1, 3)).rstrip()
-    yield from (f"{one.name}: unknown: {one.why}" for one in shown.result.measures if one.value is None)
+    yield from _unknown(shown)
     yield from shown.result.notes
     for one in shown.result.proposals:
         gains = ", ".join(f"{name} {value:.4g}" for name, value in one.gains.items())
@@ -75,6 +75,19 @@ def _page(shown: AnalysedTest, last: AnalysedTest | None) -> Iterator[str]:
     yield from (f"  not the same: {one}" for one in found)
     if not found:
         yield "  robot, firmware, parameters and test were the same"
+
+
+def _unknown(shown: AnalysedTest) -> Iterator[str]:
+    """Yield each reason once, with the figures that are missing for it."""
+    missing: dict[str, list[str]] = {}
+    for one in shown.result.measures:
+        if one.value is None:
+            missing.setdefault(one.why, []).append(one.name)
+    for why, names in missing.items():
+        which = "all figures" if len(names) == len(shown.result.measures) > 1 else ", ".join(names)
+        yield f"{which}: unknown: {why}"
+    if missing and shown.test.problem is not None:
+        yield f"The test ended early: {shown.test.problem}"
 
 
 def _number(one: Measure | None) -> str:

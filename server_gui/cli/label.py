@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from gateway.amounts import NONE, counted
-from gateway.cli.text import say, say_json, table, warn
+from gateway.cli.text import did_you_mean, say, say_json, table, warn
 from gateway.user_name import user_name
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
@@ -56,9 +56,12 @@ def main(argv: list[str]) -> int:
     labels = _wanted(made, settings, session, arguments)
     if arguments.remove:
         return _remove(labelling, labels, as_json=arguments.json)
-    for name in sorted({each.label for each in labels} - {*ACTIVITIES, *INSTANTS}):
+    known = (*ACTIVITIES, *INSTANTS)
+    for name in sorted({each.label for each in labels}.difference(known)):
         if wearer(name) is None and name != REGRESSION:
-            warn("label", f"no model learns from {name!r} (gwrms label --help names what they learn from)")
+            close = did_you_mean(name, known) or ";"
+            names = "gwrms label --help names what they learn from"
+            warn("label", f"no model learns from {name!r}{close} {names}")
     return _tell(labelling.add_all(labels), as_json=arguments.json)
 
 

@@ -21,7 +21,11 @@ LEFT_OUT: Final = "right after a change"
 
 
 def result(run: Run, who: str, unit: str, session: str = "") -> EditEvidence | None:
-    """Return the record of a finished experiment; None if nothing was written."""
+    """Return the record of a finished experiment; None if nothing was written.
+
+    It was run by whom the robot's journal names as the author of its trials, as for any other edit; by `who`
+    where the journal was not read.
+    """
     if run.state is Stands.NOTHING_DONE:
         return None
     plan, held = run.plan, [one for _, one in run.periods]
@@ -72,7 +76,7 @@ def _edit(run: Run, who: str) -> Edit:
         n=0,
         write=periods[0].write if periods else 0,
         boot_id=run.boot_id,
-        who=who,
+        who=run.watch.who or who,
         utc_ns=run.utc_ns,
         changes=(ParameterChange(plan.name, first, last),),
         trial_s=plan.dwell.trial_s,

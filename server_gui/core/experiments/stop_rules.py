@@ -56,6 +56,7 @@ class StopRules:
     bounds: Bounds
     said: Callable[[float], str] = "{:g}".format  # a value of it, for people
     why: str | None = None
+    who: str = ""  # we, as the robot's journal calls us; empty until it tells of our first write
     most: dict[str, float] = field(default_factory=dict)  # by quantity, before the beginning
     _usual: Collection[str] = ()  # quantities whose bound is twice what was usual
     _alarms: frozenset[object] = frozenset()
@@ -159,7 +160,9 @@ class StopRules:
             yield f"the guard: {what}, {entry.get('reason') or entry.get('about') or ''}"
         elif what in ENDING:
             yield f"{ENDING[what]} ({entry.get('who')})"
-        elif what in OF_OTHERS and not self._is_ours(entry):
+        elif what in OF_OTHERS and self._is_ours(entry):
+            self.who = str(entry.get("who") or "")
+        elif what in OF_OTHERS:
             yield f"{OF_OTHERS[what]} of another: {entry.get('who')}"
 
     def _is_ours(self, entry: Mapping[str, Any]) -> bool:

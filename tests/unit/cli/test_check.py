@@ -98,6 +98,15 @@ def test_mistakes_end_with_1_and_warnings_only_where_it_is_strict(
     assert lines[-1] == f"{wrong}: a robot's file, 2 mistakes"
 
 
+def test_with_keys_and_no_socket_nobody_on_the_robots_own_computer_can_stop_it(tmp_path: Path) -> None:
+    file = written(tmp_path, f'{BARE}[gateway]\nsocket = ""\n')
+    assert told(file) == "", "without keys the port serves this computer"
+    (tmp_path / "keys").mkdir()
+    said = told(file)
+    assert said.startswith("warning: [gateway] socket: is empty, and this robot has keys: nobody on its own")
+    assert "can stop it without a key" in said
+
+
 def test_without_a_file_it_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main([])

@@ -76,6 +76,7 @@ def test_all_pages_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         ("predikt", "there is no page 'predikt'; did you mean predict"),
         ("scenario", "did you mean scenarios? all are listed by gwrms docs"),
         ("how-to/scenario", "did you mean scenarios? all are listed by gwrms docs"),
+        ("reset", "there is no page 'reset'; did you mean explanation/stop (Stop, reset, enable)?"),
         ("zzzz", "there is no page 'zzzz'; all are listed by gwrms docs"),
     ],
 )

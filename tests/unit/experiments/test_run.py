@@ -13,6 +13,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.experiments.machine import ENDS, TABLE, Action, ExperimentState
 from server_gui.core.experiments.machine import Event as Step
 from server_gui.core.experiments.plan import Bounds
+from server_gui.core.experiments.result import result
 from server_gui.core.experiments.stop_rules import StopRules
 from server_gui.core.follow.events import Journalled
 from tests.support.desk import telemetry
@@ -220,6 +221,18 @@ def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: s
     world.run.take(Journalled(JournalEntries([entry])))
     assert why in (world.run.watch.why or "")
     assert bool(world.run.watch.why) is bool(why)
+
+
+def test_it_was_run_by_whom_the_robots_journal_names() -> None:
+    """A robot without keys tells nobody who they are, yet its journal names the author of each write."""
+    world = World()
+    world.until(ExperimentState.HOLDING)
+    written = {"what": "write", "after": {NAME: 0.8}, "trial_s": 60.0, "monotonic_ns": world.now_ns + 1}
+    world.run.take(Journalled(JournalEntries([{"n": 7, "who": "gwrms ab (127.0.0.1:40112)", **written}])))
+    world.settle()
+    told = result(world.run, "this desk", "A")
+    assert told is not None
+    assert told.edit.who == "gwrms ab (127.0.0.1:40112)"
 
 
 def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:

@@ -31,6 +31,7 @@ from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import HEAD, STOP, Bench, Client, config, serving
 from tests.unit.gateway.keyed import KeyedClient, keyed, raw, said
 
+ROBOT = Path("/etc/gwrms/robot.toml")
 SOMEBODY = Peer(12_345, 12_345)  # whom no computer of a test knows
 
 
@@ -66,17 +67,19 @@ def local(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "::1"])
 def test_this_computer_is_served_with_keys_and_without(host: str, has_keys: bool) -> None:
     with listen(host, 0) as listener:
-        assert kind_of(listener, has_keys=has_keys) is (ListenerKind.TLS if has_keys else ListenerKind.PLAIN)
+        assert kind_of(listener, has_keys=has_keys, robot=ROBOT) is (
+            ListenerKind.TLS if has_keys else ListenerKind.PLAIN
+        )
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 def test_other_computers_are_served_with_keys_only(host: str) -> None:
     with listen(host, 0) as listener:
-        assert kind_of(listener, has_keys=True) is ListenerKind.TLS
+        assert kind_of(listener, has_keys=True, robot=ROBOT) is ListenerKind.TLS
         with pytest.raises(
-            UnsafeListener, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT`"
+            UnsafeListener, match=r"`gwrms keys pair /etc/gwrms/robot.toml` here.*`gwrms pair HOST:PORT`"
         ):
-            kind_of(listener, has_keys=False)
+            kind_of(listener, has_keys=False, robot=ROBOT)
 
 
 def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on(
@@ -85,7 +88,7 @@ def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on
     (tmp_path / "robot.toml").write_text(HEAD, encoding="utf-8")
     assert main(["gateway", str(tmp_path / "robot.toml"), "--host", "0.0.0.0"]) == 1
     error = capsys.readouterr().err
-    assert "gwrms keys pair" in error
+    assert f"gwrms keys pair {tmp_path / 'robot.toml'}" in error
     assert "`gwrms pair HOST:PORT`" in error
 
 

@@ -1,6 +1,7 @@
 """`gwrms keys pair` and `gwrms pair`: what is typed where, and what a terminal shows."""
 
 import io
+import queue
 import signal
 import threading
 from argparse import Namespace
@@ -25,6 +26,7 @@ from gateway.connections.listeners import listen
 from gateway.main import main
 from gateway.wire.pairing import Reply, link, normal
 from gateway.wire.role import Role
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway import processes
 from tests.unit.gateway.pairing_robot import CODE, Shown
 
@@ -69,6 +71,33 @@ def test_the_code_is_a_line_of_the_input_and_no_argument(
     captured = capsys.readouterr()
     assert msgspec.json.decode(captured.out)["robot"] == "exo-01"
     assert captured.err == "", "nobody is there to be asked"
+
+
+def test_a_wrong_code_is_refused_and_nobody_is_waited_for(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types(monkeypatch, "FFFF-FFFF-FFFF-FFFF\n")
+    shown.wait()
+    assert main(["pair", str(shown.where)]) == 1
+    captured = capsys.readouterr()
+    assert "that is not the code" in captured.err
+    assert "Waiting until" not in captured.out
+
+
+def test_whoever_has_typed_the_right_code_is_told_who_is_waited_for(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: queue.Queue[str] = queue.Queue()
+    monkeypatch.setattr("gateway.cli.pair._REFUSED_S", 0.0)
+    monkeypatch.setattr("gateway.cli.pair.say", lines.put)
+    types(monkeypatch, f"{CODE}\n")
+    waiting = shown.wait()
+    with ThreadPoolExecutor(1) as pool:
+        command = pool.submit(main, ["pair", str(shown.where)])
+        assert lines.get(timeout=WAIT_S).startswith("Waiting until somebody confirms it on the robot")
+        shown.take(waiting)
+        assert command.result() == 0
+    assert "Waiting" not in "".join(lines.get_nowait() for _ in range(lines.qsize())), "it is said once"
 
 
 def test_a_person_who_mistypes_the_code_is_asked_again(

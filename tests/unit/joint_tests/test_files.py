@@ -127,6 +127,20 @@ def test_the_last_one_stands_beside_it_with_what_differs(
     assert told["curves"][0]["x"]
 
 
+def test_a_test_that_ended_early_tells_one_reason_once_and_the_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = kept(tmp_path / "exo.left_knee.step.1.jsonl")
+    lines = path.read_text(encoding="utf-8").split("\n")
+    end = {"problem": "a cycle came 105 ms late", "off": True, "state": "SWITCH_ON_DISABLED"}
+    path.write_text("\n".join([*lines[:60], json.dumps({"ended": end}), ""]), encoding="utf-8")
+    assert main(["joint-test", "show", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("unknown: ") == 1
+    assert "all figures: unknown: the joint did not follow its target, or the test ended before" in shown
+    assert "The test ended early: a cycle came 105 ms late" in shown
+
+
 def test_what_cannot_be_shown_is_told_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["joint-test", "show", str(tmp_path / "none.jsonl")]) == 1
     assert main(["joint-test", "wiggle"]) == 2

@@ -180,7 +180,7 @@ def test_the_command_labels_lists_and_takes_back(config: str, capsys: pytest.Cap
         (["walk", "--from", "100"], 1, "lies outside the session"),
         (["walk", "--from", "1"], 1, "has no length"),
         (["walk", "--from", "1", "--to", "2", "--remove"], 1, "is no label of"),
-        (["wlak", "--from", "1", "--to", "2"], 0, "no model learns from 'wlak'"),
+        (["wlak", "--from", "1", "--to", "2"], 0, "no model learns from 'wlak'; did you mean walk? gwrms"),
     ],
 )
 def test_the_command_says_what_is_wrong(
