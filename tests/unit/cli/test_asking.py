@@ -12,7 +12,6 @@ import pytest
 
 from gateway.cli import connect
 from gateway.client import Address
-from gateway.client.keys import server_file
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
 from tests.support.waiting import until
@@ -491,12 +490,3 @@ def test_no_digit_of_a_whole_number_is_lost_that_an_object_can_hold(
 ) -> None:
     assert run(robot, "set", f"gait.step_length={typed}") == 1
     assert [call["changes"]["gait.step_length"] for call in robot.called("parameter.write")] == [sent]
-
-
-@pytest.mark.parametrize("entry", ['"{}"', '{{ address = "{}" }}'])
-def test_a_robot_is_asked_by_its_name_in_the_servers_file(entry: str) -> None:
-    with FakeRobot() as robot:
-        server_file().parent.mkdir(parents=True, exist_ok=True)
-        server_file().write_text(f"[robots]\nexo-02 = {entry.format(robot.address)}\n", encoding="utf-8")
-        assert main(["stop", "--robot", "exo-02"]) == 0
-        assert len(robot.called("robot.stop")) == 1

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from gateway.client.keys import server_file
 from gateway.main import main
 from tests.fake_robot import STATES, FakeRobot, Refusal
 
@@ -120,3 +121,12 @@ def test_a_stop_tells_controllers_fallbacks_and_what_does_not_last(
         assert run(robot, "stop") == status
     said = capsys.readouterr()
     assert words in said.out + said.err
+
+
+@pytest.mark.parametrize("entry", ['"{}"', '{{ address = "{}" }}'])
+def test_a_robot_is_asked_by_its_name_in_the_servers_file(entry: str) -> None:
+    with FakeRobot() as robot:
+        server_file().parent.mkdir(parents=True, exist_ok=True)
+        server_file().write_text(f"[robots]\nexo-02 = {entry.format(robot.address)}\n", encoding="utf-8")
+        assert main(["stop", "--robot", "exo-02"]) == 0
+        assert len(robot.called("robot.stop")) == 1

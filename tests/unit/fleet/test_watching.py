@@ -100,7 +100,9 @@ def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_mov
     assert STILL_S < 1.0
     assert watch.look() == (
         Trouble(
-            "recorder", "the part “recorder” has not moved for more than 0.75 s; is this computer too busy?", False
+            "recorder",
+            "the part “recorder” has not moved for more than 0.75 s; is this computer too busy?",
+            False,
         ),
     )
     go_on.set()
