@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
+from gateway.amounts import counted
 from server_gui.core.evidence.comparison import Evidence, Measured, Word, differing, verdict, word_of
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.metrics import OF_JOINTS, OF_ROBOTS, Metric
@@ -124,7 +125,8 @@ def _left_out(periods: Iterable[HeldPeriod]) -> dict[str, int]:
 
 def _notes(pairs: int, strides: Sequence[float], *, is_same: bool) -> Iterator[str]:
     if pairs < FEWEST_PAIRS:
-        yield f"{pairs} whole pairs: with fewer than {FEWEST_PAIRS} no order can tell chance from an effect"
+        found = counted(pairs, "whole pair")
+        yield f"{found}: with fewer than {FEWEST_PAIRS} no order can tell chance from an effect"
     if not is_same:
         first, second = strides
         yield f"strides lasted {first:.2f} s with the first value, {second:.2f} s with the second: {TOLD}"
@@ -149,7 +151,7 @@ def _family(
         if told.word is Word.NO_DATA:
             continue
         if np.count_nonzero(known) < FEWEST_PAIRS:
-            found[one.key] = _few(told, f"{np.count_nonzero(known)} whole pairs")
+            found[one.key] = _few(told, counted(int(np.count_nonzero(known)), "whole pair"))
         elif not is_same and not one.metric.is_speed:
             found[one.key] = _few(told, "strides are not equally long")
         else:
