@@ -50,6 +50,9 @@ def _answered(hand: Hand) -> bool:
         hand.type("exo-01")
         hand.key("Return")
         hand.misses("What is the robot called")
+    elif hand.reads("Which node commands the drives") and hand.can_see("Answer: None"):
+        hand.click("Answer: None", exactly=True)  # nothing is offered: Enter is to leave no controller out
+        hand.misses("Which node commands the drives")
     elif hand.can_see("Answer: "):
         hand.key("Return")
     return False
