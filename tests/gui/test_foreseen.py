@@ -36,7 +36,7 @@ WALKS = {"walk": 0.94, "turn": 0.04, "stand": 0.02}
 @pytest.fixture
 def station(bench: Bench) -> Station:
     """A robot that walks, whose data are not stale within a test."""
-    bench.station.take([walking(300, -HOUR_S), looked()])
+    bench.station.take([walking(400, -HOUR_S), looked()])  # fewer may begin between two steps
     return bench.station
 
 
