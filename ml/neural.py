@@ -1,8 +1,9 @@
 """Common parts of neural networks: scaling and training."""
 
+import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +13,9 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
+_counting = threading.Lock()
+_training: list[int] = []  # threads
+_restored = ExitStack()  # the process's warnings, by whoever trains last
 
 
 def scaled(*steps: Any) -> Pipeline:
@@ -23,11 +27,20 @@ def scaled(*steps: Any) -> Pipeline:
 def fixed_epochs() -> Iterator[None]:
     """Suppress convergence warnings: the network stops after the tuned number of epochs.
 
-    Warnings are the whole process's: enter this outside of any threads that train.
+    Warnings are the whole process's: they are suppressed from the first thread that trains to the last.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
+    with _counting:
+        if not _training:
+            _restored.enter_context(warnings.catch_warnings())
+            warnings.simplefilter("ignore", ConvergenceWarning)
+        _training.append(threading.get_ident())
+    try:
         yield
+    finally:
+        with _counting:
+            _training.remove(threading.get_ident())
+            if not _training:
+                _restored.close()
 
 
 def within(x: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -1,16 +1,19 @@
-"""Many threads that parse at once: Python 3.11 breaks them off, and sound models were called damaged."""
+"""Many threads at once: Python 3.11 breaks off those that parse, and warnings are the whole process's."""
 
 import gc
 import io
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from sklearn.exceptions import ConvergenceWarning
 
 from ml.benchmarks.arrays import Arrays
+from ml.neural import fixed_epochs
 from ml.parsing import TRIES, parsing
 from ml.registry import archive
 from ml.registry.code import _tree
@@ -96,3 +99,23 @@ def _array() -> io.BytesIO:
     np.save(held, np.array([1.0]))
     held.seek(0)
     return held
+
+
+def test_no_thread_that_trains_gives_others_their_warnings_back_too_early() -> None:
+    """The first one to end did, and a model of two epochs that another one trained failed."""
+    within, ended = threading.Barrier(2), threading.Event()
+
+    def trains() -> None:
+        with fixed_epochs():
+            within.wait()
+            ended.wait()
+
+    before = list(warnings.filters)
+    other = threading.Thread(target=trains)
+    other.start()
+    with fixed_epochs():
+        within.wait()
+    assert warnings.filters[0][2] is ConvergenceWarning
+    ended.set()
+    other.join()
+    assert list(warnings.filters) == before
