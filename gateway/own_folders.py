@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import socket
 import stat
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
@@ -35,8 +36,28 @@ def to_serve_in(environ: Mapping[str, str]) -> list[Path]:
         return [_ours(Path(environ[_SERVICE]))]
     user = os.geteuid()
     system = [SYSTEM] if user == ROOT or os.access(SYSTEM, os.W_OK) else []
-    folders = [*system, user_folder(), *_of_session(environ, user)]
-    return [one for one in folders if not one.exists() or _is_safe(one, {ROOT, user})]
+    return [*system, user_folder(), *_of_session(environ, user)]
+
+
+def make_safe(folder: Path) -> None:
+    """Let nobody else write to a folder to serve in; raise `OSError` where somebody else has made it."""
+    if folder.exists() and not _is_safe(folder, {ROOT, os.geteuid()}):
+        if folder.stat().st_uid != os.geteuid():
+            raise OSError(f"{folder} is another user's")
+        folder.chmod(stat.S_IMODE(folder.stat().st_mode) & ~_OTHERS)  # made with a umask of 002
+
+
+def is_served(path: str | Path) -> bool:
+    """Return whether somebody listens at a Unix socket: a gateway that was killed leaves its own."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as trying:
+        trying.setblocking(False)
+        try:
+            trying.connect(str(path))
+        except BlockingIOError:  # it is there, and busy
+            return True
+        except OSError:
+            return False
+    return True
 
 
 def to_look_in(environ: Mapping[str, str]) -> list[Path]:

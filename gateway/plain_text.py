@@ -10,6 +10,11 @@ _NAME: Final = re.compile(r"\w[\w.@:+-]*")
 _ROBOT_NAME: Final = re.compile(r"\w[\w.@:+#,() -]*")
 
 
+def followed(text: str, sentence: str) -> str:
+    """Return a text that may lack its last sign, and a sentence after it."""
+    return f"{text}{'' if text[-1:] in '.?!…' else '.'} {sentence}"
+
+
 def is_name(text: str) -> bool:
     """Return whether a desk takes this as the name of a component, channel or parameter."""
     return len(text) <= LONGEST_NAME and _NAME.fullmatch(text) is not None

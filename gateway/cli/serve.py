@@ -20,7 +20,7 @@ from gateway.certificates import KeyProblem
 from gateway.connections.listener_kind import UnsafeListener, is_loopback
 from gateway.connections.listeners import Listeners, default_socket, inherited, listen, listen_locally, rest
 from gateway.daemon import Daemon
-from gateway.own_folders import given_for_socket, to_serve_in
+from gateway.own_folders import given_for_socket, make_safe, to_serve_in
 from gateway.process import systemd_notify
 from gateway.process.memory import share_heap
 from gateway.process.resting import ENDING
@@ -175,6 +175,7 @@ def _local(robot: config.RobotConfig) -> socket.socket | None:
     folders = [] if folder is None else [folder]
     for one in to_serve_in(os.environ) if AccessFolder(robot.access).has_keys else folders:
         try:
+            make_safe(one)
             return listen_locally(default_socket(one, robot.robot.name))
         except OSError as error:  # nobody has asked for it here
             problems.append(str(error))

@@ -12,6 +12,7 @@ import msgspec
 
 from gateway.client.address import Address
 from gateway.client.errors import (
+    NOTHING_SENT,
     CallTimeout,
     ClientError,
     LinkLost,
@@ -63,6 +64,7 @@ class Connection(asyncio.Protocol):
         self.closed: asyncio.Future[ClientError] = asyncio.get_running_loop().create_future()
         self.received_ns = time.monotonic_ns()
         self.received_bytes = 0
+        self.peer: str | None = None  # the host that was reached, as a number
         self._on_notification = on_notification
         self._transport: asyncio.Transport | None = None
         self._waiting: dict[int, tuple[asyncio.Future[msgspec.Raw], OnResult | None]] = {}
@@ -127,7 +129,7 @@ class Connection(asyncio.Protocol):
 
         """
         if self._transport is None or self.closed.done():
-            raise NotConnected(f"the link to {self.address} is closed: nothing was sent")
+            raise NotConnected(f"{NOTHING_SENT}; the link to {self.address} is closed")
         number = next(self._ids)
         answer: asyncio.Future[msgspec.Raw] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (answer, on_result)
@@ -157,6 +159,7 @@ class Connection(asyncio.Protocol):
         self._transport = transport
         sock: socket.socket = transport.get_extra_info("socket")
         if self.address.path is None:
+            self.peer = str(transport.get_extra_info("peername")[0])
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._pin is not None:
             found = transport.get_extra_info("ssl_object")

@@ -18,7 +18,7 @@ may not have happened: ask the robot before asking again.
 from collections.abc import Mapping
 from typing import Final
 
-NOTHING_SENT: Final = "nothing was sent"  # begins what a `NotConnected` of a call says
+NOTHING_SENT: Final = "nothing was sent"  # begins the `NotConnected` of a call
 
 
 class ClientError(Exception):

@@ -6,6 +6,7 @@
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -67,12 +68,27 @@ def pin_of(address: Address) -> str | None:
 
 
 def named(name: str) -> Address | None:
-    """Return the address of a robot that the server's file calls so; None too where that cannot be read."""
+    """Return the address of a robot that the server's file calls so, with its own pin.
+
+    None where no robot is called so, or nobody can tell, as the file cannot be read.
+
+    Raises:
+        BadAddress: it is called so, and its entry cannot be used.
+
+    """
     try:
         entry = tomllib.loads(server_file().read_text(encoding="utf-8"))["robots"][name]
-        return Address.parse(entry if isinstance(entry, str) else entry["address"])
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return None
+    try:
+        if isinstance(entry, str):
+            return Address.parse(entry)
+        where, pin = Address.parse(str(entry["address"])), entry.get("pin")
+        return where if pin is None else replace(where, pin=checked_pin(str(pin)))
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadAddress(
+            f"{name} stands in [robots] of {server_file()} and cannot be used: {error}"
+        ) from error
 
 
 def pins() -> set[str]:

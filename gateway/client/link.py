@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -23,9 +23,11 @@ from gateway.client.errors import (
     NotPaired,
     ProtocolError,
     RemoteError,
+    WrongRobot,
 )
 from gateway.client.local_sockets import listens_at, local_sockets, sockets_instead
 from gateway.client.subscription import Subscription
+from gateway.plain_text import followed
 from gateway.wire.framing import PROTOCOL
 from gateway.wire.method import Method, P, Params, R
 from gateway.wire.robot import CLOCK_READ, HELLO, Hello, HelloParams
@@ -84,6 +86,7 @@ class Link:
         self.hello: Hello | None = None
         self.clock = ClockTracker()
         self.connections = 0
+        self._reached = address  # as a number, where its name was looked up
         self._received_bytes = 0  # over connections that have ended
         self._on_state = on_state
         self._connection: Connection | None = None
@@ -122,8 +125,9 @@ class Link:
         problem = self.problem
         if self.state is ConnectionState.CONNECTED or problem is None:
             return
-        if isinstance(problem, (NotConnected, LinkLost)):
-            raise type(problem)(f"{problem}{sockets_instead(self.address)}") from problem
+        instead = "" if isinstance(problem, WrongRobot) else sockets_instead(self.address)
+        if instead and isinstance(problem, (NotConnected, LinkLost)):
+            raise type(problem)(followed(str(problem), instead)) from problem
         raise problem
 
     async def connected(self) -> Hello:
@@ -294,13 +298,15 @@ class Link:
             connection, hello = await self._greet(socket)
         except ClientError:
             return None
-        if listens_at(self.address, hello.listens):
+        if listens_at(self._reached, hello.listens):
             return connection, hello
         connection.close()
         return None
 
     async def _greet(self, address: Address) -> _Greeted:
         connection = await Connection.open(address, self._notified, self.settings.connect_timeout_s)
+        if address is self.address and connection.peer is not None:
+            self._reached = replace(address, host=connection.peer)
         try:
             return connection, await self._exchange_hello(connection)
         except BaseException:
@@ -310,7 +316,10 @@ class Link:
 
     async def _exchange_hello(self, connection: Connection) -> Hello:
         params = HelloParams(self.settings.client, PROTOCOL, self.settings.token)
-        hello = await self._ask(connection, HELLO, params)
+        try:
+            hello = await self._ask(connection, HELLO, params)
+        except LinkLost:  # nothing was asked for yet whose outcome could be unknown
+            raise connection.closed.result() from None
         if hello.protocol != PROTOCOL:
             raise ProtocolError(
                 f"{self.address} speaks protocol {hello.protocol}, this program speaks {PROTOCOL}; "

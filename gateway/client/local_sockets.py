@@ -1,16 +1,17 @@
 """The Unix sockets of this computer's gateways: the way to one whose port takes only clients with keys."""
 
+import ipaddress
 import os
 import socket
 from typing import Final
 
-from gateway.client.address import Address
+from gateway.client.address import DEFAULT_HOST, Address
 from gateway.client.errors import BadAddress, NotPaired
 from gateway.client.keys import is_loopback, pin_of
-from gateway.own_folders import to_look_in
+from gateway.own_folders import is_served, to_look_in
 
 _NAMED: Final = 3  # of them, in an error
-_LOCALHOST: Final = ("127.0.0.1", "::1")
+BROADCAST: Final = "255.255.255.255"
 
 
 def local_sockets(address: Address) -> list[Address]:
@@ -29,12 +30,14 @@ def local_sockets(address: Address) -> list[Address]:
 
 def sockets_instead(address: Address) -> str:
     """Return the sentence of an error where a gateway that has a socket here may be meant."""
-    found = [one.host for one in _found() if _is_served(one.host)] if _is_ours(address) else []
+    found = [one.host for one in _found() if is_served(one.host)] if _is_ours(address) else []
     if not found:
         return ""
     more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     served = f"{', '.join(found[:_NAMED])}{more}"
-    return f" On this computer a gateway is served at {served}: is it the one you mean? Then --robot PATH"
+    return (
+        f"On this computer a gateway is served at {served}: is it the one you mean? Then give --robot PATH."
+    )
 
 
 def listens_at(address: Address, listens: str | None) -> bool:
@@ -46,41 +49,35 @@ def listens_at(address: Address, listens: str | None) -> bool:
         found = Address.parse(listens or "")
     except BadAddress:
         return False
-    host = address.host.lower()
-    hosts = _LOCALHOST if host == "localhost" else (host,)
-    every = {"::" if ":" in one else "0.0.0.0" for one in hosts}
-    return found.port == address.port and found.host in (*hosts, *every)
+    host = _number(address.host)
+    every = "::" if ":" in host else "0.0.0.0"
+    return found.port == address.port and found.host in (host, every)
+
+
+def _number(host: str) -> str:
+    """Return an address as a gateway tells it; `localhost` and other names stay what they are."""
+    try:
+        number = ipaddress.ip_address(host)
+    except ValueError:
+        return DEFAULT_HOST if host.lower() == "localhost" else host
+    return str(getattr(number, "ipv4_mapped", None) or number)
 
 
 def _is_ours(address: Address) -> bool:
     """Return whether it is an address of this computer, of the network too; nobody is asked for a name."""
-    if address.path is not None:
-        return False
-    if is_loopback(address):
-        return True
-    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    if address.path is not None or is_loopback(address):
+        return address.path is None
     try:
-        host = socket.inet_ntop(family, socket.inet_pton(family, address.host))
-        with socket.socket(family, socket.SOCK_DGRAM) as trying:
-            trying.bind((host, 0))
+        number = ipaddress.ip_address(address.host)
+        with socket.socket(
+            socket.AF_INET6 if number.version == 6 else socket.AF_INET, socket.SOCK_DGRAM
+        ) as one:
+            one.bind((address.host, 0))
     except (OSError, ValueError):
         return False
-    return True
+    return not number.is_multicast and str(number) != BROADCAST
 
 
 def _found() -> list[Address]:
     paths = [path for folder in to_look_in(os.environ) for path in sorted(folder.glob("*.sock"))]
     return [Address(str(path), 0) for path in paths if path.is_socket()]
-
-
-def _is_served(path: str) -> bool:
-    """Return whether somebody listens there: a gateway that was killed leaves its socket."""
-    with socket.socket(socket.AF_UNIX) as trying:
-        trying.setblocking(False)
-        try:
-            trying.connect(path)
-        except BlockingIOError:  # it is there, and busy
-            return True
-        except OSError:
-            return False
-    return True

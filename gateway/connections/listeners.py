@@ -13,6 +13,7 @@ from collections.abc import MutableMapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway.own_folders import is_served
 from gateway.process import resting
 
 BACKLOG = 1024  # who comes while it wakes up; where there is no room, TCP tries again a second later
@@ -80,7 +81,7 @@ def listen_locally(path: Path) -> socket.socket:
     made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.parent.mkdir(parents=True, mode=0o755, exist_ok=True)
-        if path.is_socket() and not _answers(path):
+        if path.is_socket() and not is_served(path):
             path.unlink()
         made.bind(str(path))
         path.chmod(0o666)  # who may come in is judged by who they are
@@ -95,15 +96,6 @@ def listen_locally(path: Path) -> socket.socket:
 def default_socket(folder: Path, robot: str) -> Path:
     """Return where one robot's is in a folder for such."""
     return folder / f"{re.sub('[^A-Za-z0-9_.-]', '-', robot)}.sock"
-
-
-def _answers(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as trying:
-        try:
-            trying.connect(str(path))
-        except OSError:
-            return False
-    return True
 
 
 def inherited(environ: MutableMapping[str, str]) -> Listeners | None:

@@ -34,7 +34,7 @@ def change(file: Path, changes: Changes) -> None:
             f"{file} cannot be changed as it is written ({error}): change {keys} in it"
         ) from error
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with draft(file) as written:
             _write(written, new, file)
             _check(written)

@@ -105,8 +105,9 @@ def test_another_robot_that_is_pinned_there_is_not_gone_around(address: Address)
     keys_folder().mkdir(parents=True, mode=0o700)
     for file, name in zip(keys.pair("operator"), ("desk.key", "desk.crt"), strict=True):
         shutil.copy(file, keys_folder() / name)
-    with pytest.raises(WrongRobot):
+    with pytest.raises(WrongRobot) as refused:
         Robot(Address(address.host, address.port, keys.pin("impostor")), ONCE)
+    assert "served at" not in str(refused.value), "it is not steered around either"
 
 
 def test_a_paired_robot_is_never_asked_at_a_socket(address: Address, folder: Path) -> None:
@@ -119,7 +120,7 @@ def test_another_robot_does_not_stand_in_for_one_whose_gateway_is_off(address: A
     """It has the same port of another host; a stop would be confirmed by drives that nobody meant."""
     elsewhere = Address("127.0.0.9", address.port)
     with pytest.raises(
-        Unreachable, match=rf"no gateway at 127\.0\.0\.9.* served at {folder}/exo-test\.sock: is"
+        Unreachable, match=rf"no gateway at 127\.0\.0\.9.*\? On this .* at {folder}/exo-test\.sock: is"
     ):
         Robot(elsewhere, ONCE)
 
@@ -163,10 +164,14 @@ def test_whether_a_gateway_is_the_one_at_an_address(listens: str | None, expecte
     assert listens_at(Address(), listens) is expected
 
 
-def test_localhost_is_both_families() -> None:
-    for listens in ("127.0.0.1:7420", "[::1]:7420", "[::]:7420", "0.0.0.0:7420"):
+def test_localhost_is_the_address_that_was_reached_by_it() -> None:
+    """With a gateway at each of its two addresses, the other one's drives would be stopped."""
+    for listens in ("127.0.0.1:7420", "0.0.0.0:7420"):
         assert listens_at(Address("localhost"), listens)
-    assert not listens_at(Address("::1"), "0.0.0.0:7420")
+        assert not listens_at(Address("::1"), listens)
+    for listens in ("[::1]:7420", "[::]:7420"):
+        assert not listens_at(Address("localhost"), listens)
+        assert listens_at(Address("::1"), listens)
 
 
 def test_no_socket_here_stands_for_another_computer(folder: Path) -> None:
@@ -215,6 +220,33 @@ def test_the_system_s_folder_comes_first_where_it_may_be_used(
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert own_folders.to_serve_in(os.environ) == [tmp_path / "config" / "gwrms", session / "gwrms"]
+
+
+def test_a_folder_that_others_may_write_to_is_made_safe_before_it_is_served_in(
+    folder: Path, tmp_path: Path
+) -> None:
+    """As with a umask of 002: the socket was there, and no client believed it."""
+    folder.mkdir(parents=True)
+    folder.chmod(0o775)
+    with contextlib.closing(serve._local(config(keyed(tmp_path)))) as made:  # type: ignore[type-var]
+        assert made is not None
+        assert Path(made.getsockname()).parent == folder
+    assert folder.stat().st_mode & 0o777 == 0o755
+
+
+def test_no_folder_that_another_user_has_made_is_served_in(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    made_by = session.stat().st_uid
+    for folder in (tmp_path / "config" / "gwrms", session / "gwrms"):
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.chmod(0o775)
+    monkeypatch.setattr(own_folders, "ROOT", made_by + 2)
+    monkeypatch.setattr(os, "geteuid", lambda: made_by + 1)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert serve._local(config(keyed(tmp_path))) is None
+    assert f"{session / 'gwrms'} is another user's" in caplog.text
+    assert (session / "gwrms").stat().st_mode & 0o777 == 0o775, "nor is it changed"
 
 
 def test_root_by_sudo_looks_where_the_user_s_own_gateway_is(
