@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from gateway.cli.text import did_you_mean, say, warn
+from gateway.cli.text import did_you_mean, warn
 from gateway.client import (
     Address,
     BadAddress,
@@ -20,6 +20,7 @@ from gateway.client import (
 )
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
 from gateway.client.keys import named
+from gateway.plain_text import followed
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
@@ -91,7 +92,7 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
     except Unreachable as error:
         if address != USUAL:
             raise
-        raise Unreachable(f"{error} Another robot: --robot HOST:PORT") from error
+        raise Unreachable(followed(str(error), "Another robot: --robot HOST:PORT")) from error
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:
@@ -173,7 +174,8 @@ def ask(question: str, *, yes: bool) -> bool:
         return True
     if not sys.stdin.isatty():
         raise NobodyToAsk("there is no terminal to ask on, and nothing was sent; say --yes to go on")
-    say(f"{question} [y/N] ")
+    sys.stderr.write(f"{question} [y/N] ")  # the answer to a program is on the standard output
+    sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 

@@ -1,32 +1,39 @@
 """`gwrms reset`: ends a held stop."""
 
+import contextlib
+
 from gateway.amounts import NONE
 from gateway.cli.connect import ask, connect, parser
 from gateway.cli.text import say, say_json, table, warn
-from gateway.client import RemoteError, Robot
+from gateway.client import ClientError, Robot
 from gateway.wire.component import ChannelInfo
+from gateway.wire.robot import Description
 from gateway.wire.stop import Reset
 
 EPILOG = """Each drive is taken to "switch on disabled": a moving one is stopped first, a fault is reset, and
 one that held its position releases it. Nothing is enabled: the controller or gwrms enable does
 that. The stop stays held until every drive is known to be without current, and every controller
-to be stopped; otherwise the reason is named. Where no stop is held and drives are enabled, the command
+to be stopped; otherwise the reason is named. Where no stop is held and drives are under power, the command
 asks first: they lose their power."""
-LOSES = "no stop is held, and enabled are: {}. A reset stops them and takes their power. Go on?"
-ENABLED = "operation enabled"
+LOSES = "no stop is held, and under power are: {}. A reset stops them and takes their power. Go on?"
+POWERED = frozenset({"switched on", "operation enabled", "quick stop active", "fault reaction active"})
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms reset`; 0 only when no stop is held any more and every drive is where it should be."""
     made = parser("reset", "End a held stop: every drive switched off, none enabled.", EPILOG)
     made.add_argument(
-        "--yes", action="store_true", help="do not ask where no stop is held and drives are enabled"
+        "--yes", action="store_true", help="do not ask where no stop is held and drives are under power"
     )
     arguments = made.parse_args(argv)
     with connect(arguments, "reset") as robot:
-        if (enabled := _enabled(robot)) and not ask(LOSES.format(", ".join(enabled)), yes=arguments.yes):
-            warn("reset", "nothing was done")
-            return 1
+        if not arguments.yes and (powered := _powered(robot)):
+            if not ask(LOSES.format(", ".join(powered)), yes=False):
+                warn("reset", "nothing was done")
+                return 1
+            if robot.describe().stop.held:
+                warn("reset", "somebody has stopped the robot meanwhile: nothing was done")
+                return 1
         reset = robot.reset()
     if arguments.json:
         say_json(reset)
@@ -35,18 +42,22 @@ def main(argv: list[str]) -> int:
     return _verdict(reset)
 
 
-def _enabled(robot: Robot) -> list[str]:
-    """Return the drives that are enabled while no stop is held; none where that is not known."""
-    description = robot.describe()
-    if description.stop.held:
-        return []
+def _powered(robot: Robot) -> list[str]:
+    """Return the drives that may hold their joint while no stop is held; none where that is not known.
+
+    Then it is reset all the same: a reset enables nothing, and a fault has to be cleared.
+    """
+    with contextlib.suppress(ClientError):
+        description = robot.describe()
+        return [] if description.stop.held else _with_power(robot, description)
+    return []
+
+
+def _with_power(robot: Robot, description: Description) -> list[str]:
     joints = {one.name for one in description.components if one.kind == "joint"}
     states = [one for one in description.channels if one.component in joints and one.quantity == "state"]
-    try:
-        values = robot.components(*(one.name for one in states)).values if states else {}
-    except RemoteError:  # a reset enables nothing, whatever they are
-        return []
-    return [one.component for one in states if _word(one, values.get(one.name)) == ENABLED]
+    values = robot.components(*(one.name for one in states)).values if states else {}
+    return [one.component for one in states if _word(one, values.get(one.name)) in POWERED]
 
 
 def _word(channel: ChannelInfo, value: float | None) -> str | None:

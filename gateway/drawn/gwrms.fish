@@ -251,7 +251,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using reset' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using reset' -l robot -x -d 'the gateway to ask; or the path of its Unix socket, or a robot'"'"'s name in server.toml (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using reset' -l json -d 'print one JSON object per line, for programs'
-complete -c gwrms -n '_shtab_gwrms_using reset' -l yes -d 'do not ask where no stop is held and drives are enabled'
+complete -c gwrms -n '_shtab_gwrms_using reset' -l yes -d 'do not ask where no stop is held and drives are under power'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a enable -d 'Enable drives, one confirmed transition at a time.'
 complete -c gwrms -n '_shtab_gwrms_using enable' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using enable' -l robot -x -d 'the gateway to ask; or the path of its Unix socket, or a robot'"'"'s name in server.toml (default 127.0.0.1:7420)'

@@ -1063,7 +1063,7 @@ _shtab_gwrms_reset_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask\; or the path of its Unix socket, or a robot\'s name in server.toml (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[print one JSON object per line, for programs]"
-  "--yes[do not ask where no stop is held and drives are enabled]"
+  "--yes[do not ask where no stop is held and drives are under power]"
 )
 
 # guard to ensure default positional specs are added only once per session
