@@ -101,6 +101,11 @@ def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
     except EOFError:
         warn("calibrate", "nobody answers any more; nothing is written")
         return 1
+    except KeyboardInterrupt:
+        if not face.stop_asked:
+            raise
+        warn("calibrate", "ended; this command powers nothing, and has stopped nothing: gwrms stop does")
+        return 130
     finally:
         bench.close()
 

@@ -57,7 +57,7 @@ class Terminal:
         self.over()
         say(f"\n{question.text}{choices}{default}\n> ")
         line = self.typed.line()
-        if looks_like_stop(line):
+        if looks_like_stop(line, press=question.press):
             self.stop_asked = True
             signal.raise_signal(signal.SIGINT)
         return line

@@ -123,7 +123,12 @@ class Lines:
         read = _read(line.decode(errors="replace").strip())
         if not read.stop:
             self._read.put(read)
-        elif not self.stop_asked:
+        else:
+            self.stop()
+
+    def stop(self) -> None:
+        """End the dialogue in the main thread, so that every drive is stopped; from any thread."""
+        if not self.stop_asked:
             self.stop_asked = True
             signal.pthread_kill(self._main, signal.SIGINT)
 
@@ -201,6 +206,8 @@ class JsonFace:
             if question.live is not None:
                 self._show(question.live)
                 within_s = LIVE_S
+        if question.press and looks_like_stop(typed, press=True):
+            self._lines.stop()
         return typed
 
     def _show(self, live: Live) -> None:

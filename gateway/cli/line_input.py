@@ -12,13 +12,16 @@ STOP_WORD = re.compile(r"\bstop\b", re.IGNORECASE)
 OBJECT_MARKS = frozenset("{[\"'")  # before that word: an object that went wrong on its way
 
 
-def looks_like_stop(text: str) -> bool:
-    """Return whether a line that is no answer has the word alone, or within what looks like an object."""
+def looks_like_stop(text: str, *, press: bool = False) -> bool:
+    """Return whether a line that is no answer has this word alone, or within what looks like an object.
+
+    Where only Enter is asked for (`press`), whatever has it is a stop.
+    """
     word = STOP_WORD.search(text)
-    if word is None:
-        return False
-    before = text[: word.start()]
-    return not OBJECT_MARKS.isdisjoint(before) or not any(map(str.isalnum, before + text[word.end() :]))
+    if press or word is None:
+        return "stop" in text.lower() if press else False
+    is_object = not OBJECT_MARKS.isdisjoint(text[: word.start()])
+    return is_object or not any(map(str.isalnum, STOP_WORD.sub("", text)))
 
 
 class Typed:

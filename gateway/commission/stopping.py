@@ -66,13 +66,13 @@ class Stopped:
 def stop(bench: CanBench, draft: Draft) -> Stopped:
     """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
 
-    Known are those that were found until now; once the robot's file is written, its joints.
+    Known are those that were found until now, and the joints of the robot's file.
 
     Raises:
         DriverError: the bus does not open.
 
     """
-    found = _stopped(bench, set(axes_of(draft)) or set(_axes_in(draft.file)))
+    found = _stopped(bench, {*axes_of(draft), *_axes_in(draft.file)})
     return Stopped({str(axis): outcome for axis, outcome in found.items()})
 
 
