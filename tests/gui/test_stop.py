@@ -271,6 +271,8 @@ def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> N
     stopping = StopProgress()
     stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
     stopping.read([{"n": 1, "what": "reset", "held": False}])
+    assert (stopping.state, stopping.held) == (StopState.NOT_CONFIRMED, True), "of a stop before ours"
+    stopping.read([{"n": 2, "what": "stop"}, {"n": 3, "what": "reset", "held": False}])
     assert (stopping.state, stopping.held) == (StopState.IDLE, False)
 
 

@@ -223,7 +223,8 @@ class Station:
                     self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
-                    self.stopping.read(event.journal.entries)
+                    boot_id = None if before is None else before.boot_id
+                    self.stopping.read(event.journal.entries, self.flash.clock, boot_id)
                     if before is not None:
                         self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():

@@ -8,11 +8,13 @@ from enum import Enum
 from typing import Any
 
 from gateway.amounts import counted
+from gateway.client import ClockOffset
 from gateway.wire.stop import Stopped
 
 ENABLED = "operation enabled"
 HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
 AGAIN = "stopped again"  # while one is held: by somebody, or a drive by the gateway
+CLOCKS_NS = 50_000_000  # that ours and a robot's are compared to
 
 
 class StopState(Enum):
@@ -148,10 +150,16 @@ class StopProgress:
         if not held and self.state is StopState.CONFIRMED and self._is_written:
             self.was_reset(held=False)
 
-    def read(self, entries: Iterable[Mapping[str, Any]]) -> None:
+    def read(
+        self,
+        entries: Iterable[Mapping[str, Any]],
+        clock: ClockOffset | None = None,
+        boot_id: str | None = None,
+    ) -> None:
         """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
 
-        They may be older than our STOP: what they hold and reset is not that one.
+        They may be older than our STOP, by the robot's clock of this boot: what they hold and reset is
+        not that one.
         """
         told = [(number, entry) for entry in entries if isinstance(number := entry.get("n"), int)]
         if told and told[-1][0] < self._entry:
@@ -161,9 +169,20 @@ class StopProgress:
         for number, entry in told:
             if number > self._entry:
                 self._entry = number
-                self._read(entry, is_open=is_open)
+                if not self._is_before(entry, clock, boot_id):
+                    self._read(entry, is_open=is_open)
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since
+
+    def _is_before(self, entry: Mapping[str, Any], clock: ClockOffset | None, boot_id: str | None) -> bool:
+        """Return whether it is known to be older than our STOP, which was not read yet."""
+        is_ours_open = self.state is not StopState.IDLE and not self._is_written
+        if not is_ours_open or self.at_ns is None or clock is None or boot_id is None:
+            return False
+        written_ns = entry.get("monotonic_ns")
+        if entry.get("boot_id") != boot_id or not isinstance(written_ns, int):
+            return entry.get("boot_id") is not None
+        return written_ns - clock.offset_ns < self.at_ns - CLOCKS_NS
 
     def _read(self, entry: Mapping[str, Any], *, is_open: bool) -> None:
         what = entry.get("what")
@@ -179,9 +198,9 @@ class StopProgress:
     @property
     def _is_ended_by_reset(self) -> bool:
         """Whether a reset in the journal is one of what is known to be held."""
-        if self.state is StopState.CONFIRMED:
-            return self._is_written
-        return self.held and self.state is not StopState.SENT
+        if self.state is StopState.IDLE:
+            return self.held
+        return self._is_written and self.state is not StopState.SENT
 
     def show(
         self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
@@ -221,8 +240,10 @@ class StopProgress:
 
     def timed(self, confirmed: str) -> str:
         """Return the confirmation with its time: the slowest drive's, or the answer's if rows lack one."""
-        is_shown = self._confirmed and set(self.proofs) >= set(self._confirmed)
-        return f"{confirmed} in {self._slowest_ms if is_shown else self.answered_ms or 0:.0f} ms"
+        found = [self.proofs.get(drive) for drive in self._confirmed]
+        after_ms = [one.after_ms for one in found if one is not None and not one.was_so]
+        is_shown = after_ms and None not in found
+        return f"{confirmed} in {max(1.0, *after_ms) if is_shown else self.answered_ms or 0:.0f} ms"
 
     @property
     def proof(self) -> str:

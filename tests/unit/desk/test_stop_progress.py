@@ -2,6 +2,7 @@
 
 import pytest
 
+from gateway.client import ClockOffset
 from gateway.wire.stop import Stopped
 from server_gui.core.tuning.stop import StopProgress, StopState
 
@@ -84,3 +85,53 @@ def test_the_answer_dates_no_drive_that_has_not_confirmed_the_stop() -> None:
         "left_knee": 100.0,
         "right_knee": 200.0,
     }
+
+
+BOOT = "a3c1"
+SENT_NS = 10_000_000_000
+CLOCK = ClockOffset(5_000_000_000, 1000)  # the robot's is 5 s before ours
+UNREACHABLE = Stopped({"left_knee": "unreachable"}, held=True)
+
+
+def at(number: int, what: str, ours_ns: int, boot_id: str = BOOT, **more: object) -> dict[str, object]:
+    return written(number, what, monotonic_ns=ours_ns + CLOCK.offset_ns, boot_id=boot_id, **more)
+
+
+@pytest.mark.parametrize("said", [ALL, UNREACHABLE])
+@pytest.mark.parametrize("boot_id", [BOOT, "of the boot before"])
+def test_a_stop_and_its_reset_that_are_older_than_ours_do_not_end_it(said: Stopped, boot_id: str) -> None:
+    """The journal was read at the first link after a STOP that no drive had confirmed: its alarm was gone."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=SENT_NS), said)
+    stage = stopping.stage
+    before_ns = SENT_NS - 1_000_000_000 if boot_id == BOOT else SENT_NS + 1_000_000_000
+    older = [at(1, "stop", before_ns, boot_id), at(2, "reset", before_ns, boot_id, held=False)]
+    stopping.read(older, CLOCK, BOOT)
+    assert stopping.stage == stage
+    stopping.read([*older, at(3, "stop", SENT_NS + 3_000_000)], CLOCK, BOOT)
+    assert stopping.stage == stage
+    stopping.read([at(4, "reset", SENT_NS + 9_000_000_000, held=False)], CLOCK, BOOT)
+    assert stopping.stage == (StopState.IDLE, False)
+
+
+def test_a_stop_is_timed_by_the_drives_that_it_has_stopped() -> None:
+    """One that was off before took no time, and one that was not asked says nothing of this stop."""
+    stopping = StopProgress()
+    number = stopping.sent(off=["right_knee"], at_ns=0)
+    columns = {
+        "left_knee": ["quick stop active"],
+        "right_knee": ["switch on disabled"],
+        "bench": ["switch on disabled"],
+    }
+    stopping.show([20_000_000], {**columns, "bench": ["operation enabled"]}, 0)
+    stopping.show([70_000_000], columns, 0)
+    stopping.answered(number, ALL, at_ns=90_000_000)
+    assert stopping.text == "STOP confirmed by all 2 drives in 20 ms"
+
+
+def test_a_stop_whose_drives_are_not_all_in_the_rows_is_timed_by_its_answer() -> None:
+    stopping = StopProgress()
+    number = stopping.sent(at_ns=0)
+    stopping.show([20_000_000], {"left_knee": ["quick stop active"]}, 0)
+    stopping.answered(number, ALL, at_ns=90_000_000)
+    assert stopping.text == "STOP confirmed by all 2 drives in 90 ms"
