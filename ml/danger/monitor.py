@@ -174,10 +174,13 @@ class DangerMonitor:
         return DangerVerdict(stamp_ns, float(self._calibration.probability(odds)), level, why, silent)
 
     def _unless_blind(self, level: Level, at_s: float, values: Floats) -> Level:
-        """Return the level; UNKNOWN where it would fall only because what has raised it is not seen."""
+        """Return the level; UNKNOWN where it would fall only because what has raised it is not seen.
+
+        A lower one that what is still seen gives is told.
+        """
         there = np.isfinite(values[WATCHED])
         if level < self._reached and at_s < self._until_s and bool((self._seen_by & ~there).any()):
-            return Level.UNKNOWN
+            return level if level > Level.NONE and self._levels.is_met else Level.UNKNOWN
         if self._levels.is_met or level is not self._reached:
             self._reached, self._seen_by, self._until_s = level, there, at_s + HARM_S
         return level

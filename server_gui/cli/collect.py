@@ -20,7 +20,13 @@ from server_gui.cli.wearer_notes import add_worn, worn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.control_socket import ask, why_not_uploaded
 from server_gui.core.fleet.link_statistics import LinkReport
-from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingState, TaskReport
+from server_gui.core.prediction.state import (
+    WITHIN_DAYS,
+    DangerReport,
+    Figures,
+    PredictingState,
+    TaskReport,
+)
 from server_gui.core.recording.records import Worn
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.core.threads.supervision import BEAT_S
@@ -200,9 +206,13 @@ def _predicted(state: PredictingState | None) -> list[str]:
         *([] if state.labelled is None else [_labelled(state.labelled)]),
         *skipped,
         *(f"{robot}: {text}\n" for robot, text in state.adapting.items() if text),
-        *(f"{robot}: danger: {text}\n" for robot, text in state.dangers.items()),
+        *(_danger(robot, told) for robot, told in state.dangers.items()),
         *(f"{one}\n" for one in state.problems),
     ]
+
+
+def _danger(robot: str, told: DangerReport) -> str:
+    return f"{robot}: danger, {age(time.time() - told.utc_s)} ago: {told.text}\n"
 
 
 def _labelled(found: Figures) -> str:

@@ -12,6 +12,7 @@ from ml.serving.predictor import Prediction
 from server_gui.core.prediction.clock import Clock
 from server_gui.core.prediction.news import Endangered, Ruled
 from server_gui.core.prediction.rules import PredictionRule
+from server_gui.core.prediction.state import DangerReport
 from server_gui.core.settings.prediction import DANGER, RuleSettings
 
 EVERY_NS: Final = 40_000_000  # between two verdicts, at most as many as rows
@@ -30,12 +31,12 @@ class DangerWatch:
         self._calibration = calibration
         self._rules = [PredictionRule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
         self._told: DangerVerdict | None = None
-        self.text = ""  # the newest, in words
         self.restart()
 
     def restart(self) -> None:
         """Begin anew: the robot has booted, or another one wears it."""
         self._watch = DangerMonitor(self._calibration)
+        self.newest: DangerReport | None = None
 
     def take(self, batch: Batch, clock: Clock) -> Iterator[News]:
         """Take rows; what is to be told of them."""
@@ -63,7 +64,7 @@ class DangerWatch:
             or before.level is not verdict.level
             or not 0 <= verdict.stamp_ns - before.stamp_ns < TELLS_NS
         ):
-            self._told, self.text = verdict, said.text
+            self._told, self.newest = verdict, DangerReport(said.text, said.utc_ns / 1e9)
             yield said
 
 

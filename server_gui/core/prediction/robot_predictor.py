@@ -14,7 +14,7 @@ from server_gui.core.prediction.danger import News as DangerNews
 from server_gui.core.prediction.model_loading import Model
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rules import PredictionRule
-from server_gui.core.prediction.state import Quality
+from server_gui.core.prediction.state import DangerReport, Quality
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
 LATE_NS: Final = 500_000_000  # a decision that is due so long before the newest one is skipped
@@ -118,9 +118,9 @@ class RobotPredictor:
         return serves
 
     @property
-    def danger(self) -> str:
-        """What was said of danger last, in words; empty where it is off, or nothing was said yet."""
-        return "" if self._danger is None else self._danger.text
+    def danger(self) -> DangerReport | None:
+        """What was said of danger last; None where it is off, or nothing was said yet."""
+        return None if self._danger is None else self._danger.newest
 
     def restart(self) -> None:
         """Forget everything seen until now."""

@@ -119,7 +119,11 @@ class PredictionService:
             {}
             if self._adapting is None
             else {name: one.standing or one.text for name, one in self._adapting.now.items()},
-            {robot: known.danger for robot, known in self._robots.copy().items() if known.danger},
+            {
+                robot: told
+                for robot, known in self._robots.copy().items()
+                if (told := known.danger) is not None
+            },
         )
 
     def _powerless(self) -> Iterator[str]:

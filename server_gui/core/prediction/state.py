@@ -54,6 +54,13 @@ class TaskReport(Struct, frozen=True):
     drifted: tuple[str, ...]  # channels
 
 
+class DangerReport(Struct, frozen=True):
+    """What was said of a robot's danger last, in words, and the UTC (s) of that."""
+
+    text: str
+    utc_s: float
+
+
 class PredictingState(Struct, frozen=True):
     """State of prediction: predictions by robot and task, and problems of models, in words."""
 
@@ -63,4 +70,4 @@ class PredictingState(Struct, frozen=True):
     judged: int = 0  # decisions since the start
     skipped: int = 0  # decisions that were due while too much was to do
     adapting: dict[str, str] = {}  # by robot, in words; "" where there is nothing to say
-    dangers: dict[str, str] = {}  # by robot, in words, where danger is on and something was said
+    dangers: dict[str, DangerReport] = {}  # by robot, where danger is on and something was said

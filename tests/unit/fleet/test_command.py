@@ -5,6 +5,7 @@ import gc
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from gateway.client import Address
 from server_gui.cli.collect import status_text
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkStatistics
+from server_gui.core.prediction.state import DangerReport, PredictingState
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import Upload
@@ -89,6 +91,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         robots={"exo-01": LinkStatistics(Address("192.0.2.7")).report("")},
         recorder=RecorderState(12, 3, 4, 0.01, (alarm,)),
         uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network", ("/spool/00000003.damaged.db",)),
+        prediction=PredictingState(dangers={"exo-01": DangerReport("none, 0.04", time.time() - 3600.0)}),
     )
     text = status_text(report)
     for words in (
@@ -101,6 +104,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         "5.0 MiB",
         "192.0.2.7:7420",
         "exo-01: the link is idle",
+        "exo-01: danger, 3600 s ago: none, 0.04",
     ):
         assert words in text
 

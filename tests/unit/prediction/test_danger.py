@@ -75,7 +75,10 @@ def test_the_service_says_unknown_of_a_robot_without_the_channels(folder_url: st
             one.take(ROBOT, event)
         told.until(lambda: any(isinstance(news, Endangered) for news in told.news))
         assert not one.state.problems
-        assert one.state.dangers == {ROBOT: next(n for n in told.news if isinstance(n, Endangered)).text}
+        first = next(news for news in told.news if isinstance(news, Endangered))
+        report = one.state.dangers[ROBOT]
+        assert report.text == first.text
+        assert report.utc_s >= first.utc_ns / 1e9, "the status tells its age"
     said = [news for news in told.news if isinstance(news, Endangered)]
     assert is_unknown(said)
     assert said[0].text.startswith("unknown: its detectors lack data, or learn what is usual")
