@@ -97,7 +97,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=now,
-            check=remedy(robot),
+            check=", ".join(remedy(robot)),
             since_s=stopping.since_s,
             aside=f"the STOP before failed: {_then(stopping.why)}" if moving else "",
         )
@@ -129,12 +129,12 @@ def role_of(robot: Robot) -> str | None:
     return None if robot.description is None else robot.description.role
 
 
-def remedy(robot: Robot) -> str:
-    """Return what to do after a STOP that nobody has confirmed."""
+def remedy(robot: Robot) -> tuple[str, ...]:
+    """Return what to do after a STOP that nobody has confirmed, the first thing first."""
     is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
     if is_off:
-        return "STOP again to be sure"
-    return "STOP again, or use the hardware stop" if _is_live(robot) else "use the hardware stop"
+        return ("STOP again to be sure",)
+    return ("STOP again", "or use the hardware stop") if _is_live(robot) else ("use the hardware stop",)
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:

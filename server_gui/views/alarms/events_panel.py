@@ -26,6 +26,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import WHO
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
+from server_gui.views.alarms.words import gathered
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
@@ -85,12 +86,8 @@ class NewsModel(QAbstractTableModel):
         self._take()
 
     def _take(self) -> None:
-        found: list[tuple[Station | None, Active]] = [
-            (None, one) for one in self._desk.recording.alarms.active
-        ]
-        found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
-        found.sort(key=lambda told: told[1].alarm.rank)  # worst first: few are in sight
-        active = [_of_alarm(*told) for told in found]
+        worst_first = sorted(gathered(self._desk), key=lambda told: told[1].alarm.rank)  # few are in sight
+        active = [_of_alarm(*told) for told in worst_first]
         alarms = {one.title: one.alarms for one in self._desk.stations}
         news = (
             _of_item(item, event_mark(item, alarms.get(item.robot)))

@@ -15,6 +15,7 @@ from server_gui.views.alarms.words import (
     Told,
     details,
     fewer,
+    gathered,
     going_on,
     headline,
     key_of,
@@ -147,10 +148,8 @@ class AlarmStrip(ClickableFrame):
         How to go on after a reset is what its user looks for next: only what is bad goes before.
         """
         selected = self._desk.selected
-        found: list[Told] = [(None, one) for one in self._desk.recording.alarms.active]
-        found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
         return sorted(
-            found,
+            gathered(self._desk),
             key=lambda told: (
                 told[1].is_acknowledged,
                 told[1].alarm.kind is not Kind.NOT_STOPPED,

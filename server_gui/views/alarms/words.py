@@ -8,6 +8,7 @@ from typing import Final
 from server_gui.core.alarms.alarm import Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import Mark
@@ -21,6 +22,12 @@ REMEDY: Final = "→"  # what there is to check, or to do
 def key_of(told: Told) -> Key:
     station, one = told
     return "" if station is None else station.name, one.alarm.key
+
+
+def gathered(desk: Desk) -> list[Told]:
+    """Return every alarm: of the recording, then of each robot."""
+    found: list[Told] = [(None, one) for one in desk.recording.alarms.active]
+    return found + [(station, one) for station in desk.stations for one in station.alarms.active]
 
 
 def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:

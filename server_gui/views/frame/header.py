@@ -171,7 +171,7 @@ def _outcome(station: Station) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (stopping.timed(counted(stopping.drives, "drive")),),
-        StopState.NOT_CONFIRMED: (remedy(station.robot).partition(",")[0],),
+        StopState.NOT_CONFIRMED: remedy(station.robot),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
