@@ -122,6 +122,20 @@ def test_models_are_listed_and_compared_by_names_instead_of_hashes(
     assert "not known" in page.compare.week.text()
 
 
+def test_what_is_known_of_a_store_that_is_away_promotes_nothing(
+    shown: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, (_, other) = opened(shown), both
+    choose(shown, page, other)
+    assert page.promote.isEnabled()
+    monkeypatch.setattr(archive.models.reach, "problem", "there is no store any more")
+    shown.draw()
+    assert page.chosen is not None, "it is still listed"
+    for button in (page.promote, page.back):
+        assert not button.isEnabled()
+        assert "is not reached" in button.toolTip()
+
+
 def test_a_model_serves_only_once_that_was_confirmed(
     shown: Shown, both: tuple[Card, Card], registry: Registry, archive: Archive
 ) -> None:

@@ -18,7 +18,7 @@ from server_gui.views.models.models_table import ModelsModel, ModelsTable
 from server_gui.views.models.train_form import TrainForm, offer_robots
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import bring_into_sight
 
 SLOW: Final = 6  # frames between two looks
@@ -29,6 +29,9 @@ EMPTY: Final = (
 )
 
 
+PROMOTES: Final = "Let the selected model serve, after showing the change"
+ROLLS_BACK: Final = "Return to the previous model, after showing the change"
+UNREACHED: Final = "The store is not reached: nothing can be promoted or rolled back until it is"
 AWAY: Final = "▲ The store is not reached; retrying. Below is what was known before: {why}"
 
 
@@ -110,8 +113,6 @@ class ModelsPage(QWidget):
     # --- inside
 
     def _build(self) -> None:
-        self.promote.setToolTip("Let the selected model serve, after showing the change")
-        self.back.setToolTip("Return to the previous model, after showing the change")
         self.new.setCheckable(True)
         words = PlainLabel("for")
         words.setObjectName("dim")
@@ -197,7 +198,8 @@ class ModelsPage(QWidget):
     def _show_actions(self, entry: Entry | None) -> None:
         asked = self._models.change is not None
         is_reached = self._models.reach.problem is None
-        for button in (self.promote, self.back):
+        for button, does in ((self.promote, PROMOTES), (self.back, ROLLS_BACK)):
             button.setEnabled(entry is not None and not asked and is_reached)
+            set_tip(button, does if is_reached else UNREACHED)
         training_now = " · training" if self._models.is_training else ""
         self._list.set_note(f"{len(self._models.found.entries)} models{training_now}")
