@@ -14,7 +14,7 @@ from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
 _counting = threading.Lock()
-_training: list[int] = []  # threads
+_training: list[None] = []  # as long as something trains
 _restored = ExitStack()  # the process's warnings, by whoever trains last
 
 
@@ -33,12 +33,12 @@ def fixed_epochs() -> Iterator[None]:
         if not _training:
             _restored.enter_context(warnings.catch_warnings())
             warnings.simplefilter("ignore", ConvergenceWarning)
-        _training.append(threading.get_ident())
+        _training.append(None)
     try:
         yield
     finally:
         with _counting:
-            _training.remove(threading.get_ident())
+            _training.pop()
             if not _training:
                 _restored.close()
 
