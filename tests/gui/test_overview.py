@@ -27,6 +27,8 @@ from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.marks import time_of_day
 from server_gui.views.overview.joint_table import ANGLE, ERROR, STATE, STOP, TORQUE, JointModel, JointTable
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
@@ -498,3 +500,36 @@ def test_letters_of_the_sides_stand_on_no_leg(theme: Theme) -> None:
     assert not first.intersects(second)
     for box in taken:
         assert not any(box.contains(point) for point in leg)
+
+
+@pytest.mark.parametrize(("height", "is_first"), [(700, True), (1200, False)])
+def test_the_order_of_the_overview_stays_as_alarms_and_lines_come_and_go(
+    window: MainWindow, bench: Bench, height: int, is_first: bool
+) -> None:
+    """It flipped as a line came: what somebody read was elsewhere, just when something was wrong."""
+    window.resize(1366, height)
+    bench.station.take([walking(100), looked()])
+    bench.draw(window)
+    page = window.tabs.overview
+    assert page._is_low is is_first
+    orders = set()
+    for spare in (-400, 30, 400):
+        page.status_lines.setFixedHeight(max(20, 200 - spare))
+        bench.draw(window)
+        orders.add(page._joints.y() < page._status.y())
+    assert orders == {is_first}
+
+
+def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(
+    overview: Overview, bench: Bench
+) -> None:
+    received_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    bench.station.take([walking(10), looked(), telemetry([received_ns], states, received_ns)])
+    stopping = bench.station.stopping
+    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    stopping.answered_ms = 21.0
+    overview.read_now()
+    overview.refresh()
+    assert overview.now.drives.main.text() == f"STOPPED since {time_of_day(stopping.since_s or 0.0)}"
+    assert overview.now.drives.detail.text() == "6/6 confirmed in 21 ms"

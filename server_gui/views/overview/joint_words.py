@@ -13,7 +13,6 @@ from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.elided import whole_words
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
-WIDE: Final = 400  # at text of 100 %: then a line is enough for an error
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 # By the columns with bars that are shown; the fullest wording first.
 BARS: Final = {
@@ -29,7 +28,7 @@ BARS: Final = {
 
 
 class JointWords(PlainLabel):
-    """As high as a line or two, by its width alone: what is wrong moves nothing around."""
+    """As high as its `lines`: what is wrong moves nothing around."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -37,6 +36,7 @@ class JointWords(PlainLabel):
         self._errors: Sequence[tuple[str, str]] = ()
         self._tone = "bad"
         self._bars: frozenset[int] = frozenset()
+        self._lines = 1
         self.setAccessibleName("Problems of joints")
         self.setWordWrap(True)
         self.setObjectName("dim")
@@ -54,6 +54,11 @@ class JointWords(PlainLabel):
             self._errors, self._bars, self._tone = errors, bars, tone
             self._fit()
 
+    def be_high(self, lines: int) -> None:
+        """Have room for so many lines; never told while it is laid out, which would be too late."""
+        self._lines = lines
+        self._fit()
+
     def sizeHint(self) -> QSize:
         return QSize(1, self._high)
 
@@ -69,8 +74,7 @@ class JointWords(PlainLabel):
 
     @property
     def _high(self) -> int:
-        lines = 1 if self.width() >= self._theme.px(WIDE) else 2
-        return lines * self.fontMetrics().lineSpacing()
+        return self._lines * self.fontMetrics().lineSpacing()
 
     def _fit(self) -> None:
         """Say as much as has room: the first whole, and how many more there are."""

@@ -8,9 +8,10 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
-from server_gui.views.marks import Mark, drives_mark, enabled_text
+from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.mark import MarkIcon
@@ -184,5 +185,24 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     unproven = station.stopping.is_unproven
     mark = drives_mark(station.robot, is_unproven=unproven)
     if station.stopping.held and not unproven and mark.colour == "dim":  # off, and held so
-        return Mark("triangle", "warn", "STOPPED"), ("STOPPED",), (f"{mark.word} · {count}", count)
+        return (
+            Mark("triangle", "warn", "STOPPED"),
+            _since(station),
+            (*_proven(station), f"{mark.word} · {count}", count),
+        )
     return mark, (mark.word.capitalize(),), (count,)
+
+
+def _since(station: Station) -> tuple[str, ...]:
+    since_s = station.stopping.since_s
+    if since_s is None:
+        return ("STOPPED",)
+    return f"STOPPED since {time_of_day(since_s)}", "STOPPED"
+
+
+def _proven(station: Station) -> tuple[str, ...]:
+    """Return that every drive has confirmed the STOP, where this window knows."""
+    stopping = station.stopping
+    if stopping.state is not StopState.CONFIRMED:
+        return ()
+    return (stopping.timed(f"{stopping.drives}/{stopping.drives} confirmed"),)

@@ -37,7 +37,7 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
-LEEWAY: Final = 40  # high, likewise: so much must be spare before the joints go down again
+SPARE: Final = 100  # high, likewise: so much must be left for lines and alarms that come
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
 SHARE: Final = 0.05  # of both feet: a figure that is further off than its picture is read at once
@@ -102,6 +102,7 @@ class Overview(QWidget):
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
         self._columns, self._is_plots, self._is_low = 0, False, False
+        self._ordered_for: object = None
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -109,19 +110,29 @@ class Overview(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Arrange it anew where another number of cards fits, or all of it is seen at once or no more."""
-        columns, is_low = self._fitting, self._is_too_low()
-        if columns != self._columns or is_low is not self._is_low:
-            self._is_low = is_low
-            self._arrange(columns)
+        """Arrange it anew where another number of cards fits."""
+        if self._fitting != self._columns:
+            self._arrange(self._fitting)
+
+    def _order(self) -> None:
+        """Put the joints where they belong in a window of this size.
+
+        As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
+        """
+        room = self.window().size(), self._theme.scale, self._model.rowCount(), self._columns
+        if room != self._ordered_for:
+            self._ordered_for = room
+            is_low = self._is_too_low()
+            if is_low is not self._is_low:
+                self._is_low = is_low
+                self._arrange(self._fitting)
 
     def _is_too_low(self) -> bool:
-        """Return whether something has to be scrolled to."""
+        """Return whether something has to be scrolled to, now or with a few lines more."""
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return False
-        spare = seen.height() - self._grid.totalMinimumSize().height()
-        return spare < (self._theme.px(LEEWAY) if self._is_low else 0)
+        return seen.height() - self._grid.totalMinimumSize().height() < self._theme.px(SPARE)
 
     @property
     def _fitting(self) -> int:
@@ -144,6 +155,7 @@ class Overview(QWidget):
     def _arrange(self, columns: int) -> None:
         """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
+        self._wrong.be_high(1 if columns == len(SHARES) else 2)  # a line is enough for an error
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
         first = 2 if self._is_low else 1
@@ -175,7 +187,7 @@ class Overview(QWidget):
         if slow:
             self._read_ns = now_ns()
             self.now.refresh()
-            self._fit()  # also where less of it is seen, which changes nothing of its size
+            self._order()  # not as the window is resized: its parts have their sizes now
         self._refresh_status(station, slow=slow)
         self._refresh_posture(station, slow=slow)
         self._refresh_pressure(station, slow=slow)
