@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterator
 import pytest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
+from server_gui.core.desk.recording import Said, Tone
 from server_gui.views.frame.header import Header
+from server_gui.views.frame.recording_chip import _words
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
@@ -41,6 +43,30 @@ def test_chips_never_overlap(bench: Bench, theme: Theme, header: Header, scale: 
             halved = rules.halved_numbers(header) if width >= LEAST else []
             broken += [f"{state.__name__} {width}: {one}" for one in halved]
     assert not broken, "\n".join(broken)
+
+
+@pytest.mark.parametrize(("width", "scale"), [(1024, 1.5), (1024, 1.0), (1366, 1.5), (1920, 1.0)])
+@pytest.mark.parametrize("state", [_walks, _link_lost, _fault])
+def test_age_and_recording_are_in_sight_beside_stop_however_large_the_text_is(
+    bench: Bench, theme: Theme, header: Header, state: Callable[[Bench], None], width: int, scale: float
+) -> None:
+    theme.set(scale=scale)
+    header.be_short(width < theme.px(1200))
+    header.resize(width, header.height())
+    _told(bench, state)
+    header.refresh()
+    shown = {name: chip.main_text for name, chip in header._chips.items() if chip.isVisible()}
+    assert {"robot", "drives", "link", "recording"} <= shown.keys(), shown
+    assert shown["recording"] in ("Not recording", "REC off")
+    assert not rules.halved_numbers(header)
+
+
+def test_a_recording_of_which_nothing_is_known_is_not_said_to_be_off(header: Header, bench: Bench) -> None:
+    said = Said(Tone.OFF, "Recording: not known yet", brief="REC ?")
+    for brief, text in ((False, said.text), (True, said.brief)):
+        header.recording.be_brief(brief)
+        header.recording.say(_words(bench.desk.recording, said, None))
+        assert header.recording.main_text == text
 
 
 def _told(bench: Bench, state: Callable[[Bench], None]) -> None:

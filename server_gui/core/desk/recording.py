@@ -79,11 +79,12 @@ class Tone(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """One line, and what there is to know and to do about it."""
+    """One line, and what there is to know and to do about it; `brief` where there is little room."""
 
     tone: Tone
     text: str
     detail: str = ""
+    brief: str = "NOT REC"
 
 
 class Recording:
@@ -259,7 +260,7 @@ class Recording:
         """
         report = self.report
         if self._keeper is None:
-            return Said(Tone.OFF, "Not recording", self.why)
+            return Said(Tone.OFF, "Not recording", self.why, "REC off")
         threads = self._threads.get(self.by, ())
         ended = [known.text for known in threads if known.thread in NEEDED and not known.works]
         if ended:
@@ -267,14 +268,18 @@ class Recording:
         if self.problem is not None:
             return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
         if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
-            return Said(Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known")
+            return Said(
+                Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known", "REC ?"
+            )
         if report is None:
-            return Said(Tone.OFF, "Recording: not known yet", self.why)
+            return Said(Tone.OFF, "Recording: not known yet", self.why, "REC ?")
         stopped = [alarm.text for alarm in report.recorder.alarms if alarm.kind in STOPPED]
         if stopped:
             return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(stopped))
         if report.is_paused:
-            return Said(Tone.OFF, "Not recording: stopped", "somebody has stopped it in this window")
+            return Said(
+                Tone.OFF, "Not recording: stopped", "somebody has stopped it in this window", "REC off"
+            )
         addresses = {link.address for link in report.robots.values()}
         if self.by is By.OTHER and address is not None and address not in addresses:
             return Said(Tone.WARNING, "This robot is NOT recorded", _not_followed(report))
@@ -282,7 +287,7 @@ class Recording:
 
     def _going_on(self, report: CollectorReport, address: str | None, *, comes: bool) -> Said:
         if address is None and not comes:
-            return Said(Tone.OFF, NO_ROBOT, f"spool {report.spool}")
+            return Said(Tone.OFF, NO_ROBOT, f"spool {report.spool}", "REC off")
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
@@ -302,6 +307,7 @@ class Recording:
             Tone.WARNING if problems or facts[1] == NOTHING else Tone.GOOD,
             " · ".join(facts),
             "\n".join(filter(None, detail)),
+            "REC",
         )
 
     def _reported(self, keeper: Keeper, report: CollectorReport) -> None:

@@ -26,6 +26,7 @@ class Words:
     parts: tuple[str, ...] = ()
     tip: str = ""
     shorter: str = ""  # the first part, where it has no room: never less
+    brief: tuple[str, ...] = ()  # main and parts, where it would have no room otherwise
 
 
 class Chip(QFrame):
@@ -39,6 +40,7 @@ class Chip(QFrame):
         self._theme = theme
         self._most = most
         self._words = Words(Mark("ring", "old"), "")
+        self._is_brief, self._offers = False, True
         self.setObjectName("card")
         self.setAccessibleName(name)
         self._icon = MarkIcon(theme, 12)
@@ -63,36 +65,45 @@ class Chip(QFrame):
     def detail_text(self) -> str:
         return self._detail.text()
 
-    @property
-    def needs(self) -> int:
-        """How wide it is with all of its first line, and what is short of the second."""
+    def needs(self, *, brief: bool = False) -> int:
+        """Return how wide it is with all of its first line, and what is short of the second."""
         bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
-        short = next((part for part in self._words.parts[:1] if len(part) <= SHORT), "")
-        words = max(bold.horizontalAdvance(self._words.main), plain.horizontalAdvance(short)) + self._around
+        main, *parts = self._said(brief=brief)
+        short = next((part for part in parts[:1] if len(part) <= SHORT), "")
+        words = max(bold.horizontalAdvance(main), plain.horizontalAdvance(short)) + self._around(brief=brief)
         return max(min(words, self._theme.px(self._most) or words), self.least)
 
     @property
     def least(self) -> int:
         """How wide it is with what it must say."""
-        plain = QFontMetrics(self._theme.text_font())
-        word = plain.horizontalAdvance(self._words.shorter) + self._around if self._words.shorter else 0
+        plain, shorter = QFontMetrics(self._theme.text_font()), self._words.shorter
+        word = plain.horizontalAdvance(shorter) + self._around() if shorter else 0
         return max(word, self._theme.px(LEAST))
 
     @property
     def wants(self) -> int:
-        """How wide it is with everything."""
-        plain = QFontMetrics(self._theme.text_font())
-        main = QFontMetrics(self._theme.text_font(bold=True)).horizontalAdvance(self._words.main)
-        detail = plain.horizontalAdvance(" · ".join(self._words.parts))
-        return max(self.needs, max(main, detail) + self._around)
+        """How wide it is with everything that it has to say now."""
+        bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
+        main, *parts = self._said(brief=self._is_brief)
+        words = max(bold.horizontalAdvance(main), plain.horizontalAdvance(" · ".join(parts)))
+        return max(self.needs(brief=self._is_brief), words + self._around(brief=self._is_brief))
 
     def say(self, words: Words) -> None:
         """Show this."""
         self._words = words
         self._icon.show_mark(words.mark)
-        set_text(self._main, words.main)
         set_tip(self, words.tip or "\n".join(filter(None, (words.main, " · ".join(words.parts)))))
         self.setAccessibleDescription(f"{words.main}, {' · '.join(words.parts)}")
+        self._fit()
+
+    def be_brief(self, on: bool) -> None:
+        """Show its brief words, without its button; or again all of them."""
+        self._is_brief = on
+        self._fit()
+
+    def offer(self, on: bool) -> None:
+        """Show its button, where there is room for it, or do not."""
+        self._offers = on
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -100,17 +111,24 @@ class Chip(QFrame):
         self._fit()
 
     def _fit(self) -> None:
-        room = self.width() - self._around
-        plain, parts = QFontMetrics(self._theme.text_font()), self._words.parts
+        is_brief = self._is_brief and bool(self._words.brief)
+        if self._button is not None:
+            self._button.setVisible(self._offers and not is_brief)
+        room, plain = self.width() - self._around(brief=is_brief), QFontMetrics(self._theme.text_font())
+        main, *parts = self._said(brief=is_brief)
         texts = [" · ".join(parts[:count]) for count in range(len(parts), 0, -1)]
         texts += filter(None, (self._words.shorter,))
         fits = (text for text in texts if plain.horizontalAdvance(text) <= room)
         last = texts[-1] if texts and not any(sign.isdigit() for sign in texts[-1]) else ""  # a name at most
+        set_text(self._main, main)
         set_text(self._detail, next(fits, last))
 
-    @property
-    def _around(self) -> int:
-        """Width beside the words."""
-        button = self._button
-        beside = 0 if button is None or button.isHidden() else button.sizeHint().width() + 6
+    def _said(self, *, brief: bool) -> tuple[str, ...]:
+        words = self._words
+        return words.brief if brief and words.brief else (words.main, *words.parts)
+
+    def _around(self, *, brief: bool = False) -> int:
+        """Return the width beside the words."""
+        button = None if brief and self._words.brief else self._button
+        beside = 0 if button is None or not self._offers else button.sizeHint().width() + 6
         return self._theme.px(12) + 34 + beside

@@ -28,7 +28,8 @@ STOP_MARKS: Final = {
 }
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
-# Left out in this order where there is less room; alarms stand below the header.
+# Brief, and then left out, in this order where there is less room; alarms stand below the header.
+BRIEF: Final = ("recording", "link")
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
 LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
@@ -119,26 +120,48 @@ class Header(QWidget):
         self._empty.setVisible(station is None)
         has_outcome = self._has_outcome
         shown = [] if station is None else list(self._chips)
-        room = self._room(has_outcome=has_outcome)
-        needs = {name: chip.needs for name, chip in self._chips.items()}
-        wide = dict(needs)
-        for name in SPARE:
-            if name == "link":  # before that the name of the robot gives way
-                needs["robot"] = min(
-                    needs["robot"], max(self._chips["robot"].least, self._theme.px(LEAST_NAME))
-                )
-            if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
-                shown.remove(name)
-        if sum(wide[one] + self._row.spacing() for one in shown) <= room:
-            needs = wide
+        needs = self._shared(shown, self._room(has_outcome=has_outcome))
         for name, chip in self._chips.items():
-            chip.setVisible(name in shown)
-            chip.setMinimumWidth(needs[name] if name in shown else 0)
-            self._row.setStretchFactor(chip, chip.wants if name in shown else 0)
+            chip.setVisible(name in needs)
+            chip.setMinimumWidth(needs.get(name, 0))
+            self._row.setStretchFactor(chip, chip.wants if name in needs else 0)
         self._outcome.setVisible(has_outcome)
-        self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
+        self._outcome.setMinimumWidth(self._outcome.needs() if has_outcome else 0)
         self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
         self._row.activate()  # at once: what is wider now would lie over its neighbour until the next event
+
+    def _shared(self, shown: list[str], room: int) -> dict[str, int]:
+        """Return how wide each chip is that has room.
+
+        Where there is little, some are brief, the robot's name gives way, and at last a chip is left out.
+        """
+        chips, spacing = self._chips, self._row.spacing()
+        needs = {name: chips[name].needs() for name in shown}
+        brief: set[str] = set()
+
+        def has_room() -> bool:
+            return sum(needs.values()) + len(needs) * spacing <= room
+
+        for name in BRIEF:
+            if name in needs and not has_room():
+                brief.add(name)
+                needs[name] = chips[name].needs(brief=True)
+        if "robot" in needs and not has_room():
+            needs["robot"] = min(needs["robot"], max(chips["robot"].least, self._theme.px(LEAST_NAME)))
+        for name in SPARE:
+            if name in needs and not has_room():
+                del needs[name]
+        for name in ("robot", *BRIEF):  # as wide again as it may be without what is left out
+            least = needs.get(name, 0)
+            if least:
+                needs[name] = chips[name].needs()
+                if has_room():
+                    brief.discard(name)
+                else:
+                    needs[name] = least
+        for name in BRIEF:
+            chips[name].be_brief(name in brief)
+        return needs
 
     @property
     def _has_outcome(self) -> bool:
@@ -151,7 +174,7 @@ class Header(QWidget):
         margins, spacing = self._row.contentsMargins(), self._row.spacing()
         fixed = [self._brand, self.reset_button, self.menu, self.stop]
         taken = sum(one.sizeHint().width() + spacing for one in fixed if not one.isHidden())
-        taken += self._outcome.needs + spacing if has_outcome else 0
+        taken += self._outcome.needs() + spacing if has_outcome else 0
         return self.width() - margins.left() - margins.right() - taken
 
     def _restyle(self) -> None:
@@ -217,23 +240,28 @@ def _status(station: Station) -> Words:
 
 
 def _link(station: Station) -> Words:
+    mark, main, parts = _linked(station)
+    return Words(mark, main, parts, brief=tuple(main.split(" · ")))
+
+
+def _linked(station: Station) -> tuple[Mark, str, tuple[str, ...]]:
     robot, link = station.robot, station.robot.link
     age = age_text(robot.age_s())
     old = f" · {age} old" if robot.age_s() is not None else ""
     if not station.is_linked:
         main = f"No link{old}" if link.links else "Never reached"
-        return Words(Mark("cross", "bad"), main, ("trying again", link.problem or link.state.value))
+        return Mark("cross", "bad"), main, ("trying again", link.problem or link.state.value)
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     again = (f"linked {link.links} times",) if link.links > 1 else ()
     parts = (f"{lost} lost", f"round trip {trip}", *again)
     if robot.age_s() is None:
-        return Words(Mark("ring", "old"), "Linked, no data yet", parts)
+        return Mark("ring", "old"), "Linked, no data yet", parts
     if robot.is_stale():
-        return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
+        return Mark("triangle", "warn"), f"STALE · {age} old", parts
     mark = Mark("disc", "warn" if lost else "good") if robot.has_rate() else Mark("ring", "old")
     mark = Mark("triangle", "warn") if robot.is_slow() else mark
-    return Words(mark, f"{age} old · {robot.rate_text()}", parts)
+    return mark, f"{age} old · {robot.rate_text()}", parts
 
 
 _WORDS: Final[dict[str, Callable[[Station], Words]]] = {

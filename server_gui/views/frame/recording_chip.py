@@ -44,7 +44,7 @@ class RecordingChip(Chip):
         if self.turn.text() != text:
             self.turn.setText(text)
             self.turn.setAccessibleName(f"{text.rstrip('…')} recording")
-        self.turn.setVisible(recording.can_pause)
+        self.offer(recording.can_pause)
         set_tip(self.turn, "Of every robot of this window (Ctrl+R)")
 
 
@@ -91,8 +91,8 @@ def _words(recording: Recording, said: Said, address: str | None) -> Words:
     since_s = None if link is None else link.recording_since_utc_s
     tip = "\n".join(filter(None, (said.text, said.detail)))
     if said.tone in (Tone.BAD, Tone.OFF) or since_s is None:
-        return Words(mark, first, (rest,) if rest else (), tip)
+        return Words(mark, first, (rest,) if rest else (), tip, brief=(said.brief,))
     clock = clock_text(max(0.0, time.time() - since_s))
     said_of = tuple(rest.split(" · "))
     parts = (said_of[0], link.notes) if link is not None and link.notes else said_of
-    return Words(mark, f"{first} {clock}", parts, tip)
+    return Words(mark, f"{first} {clock}", parts, tip, brief=(f"{said.brief} {clock}", *parts[:1]))
