@@ -12,7 +12,8 @@ from server_gui.core.follow.robot import Robot
 OURS: Final = "this computer is overloaded, end other programs on it first"
 THEIRS: Final = "the robot's computer is overloaded, see what keeps it busy first (gwrms blame)"
 UNPLUGGED: Final = "does not exist"  # as drivers say of a port
-SILENT: Final = frozenset({Kind.NO_LINK, Kind.STALE, Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
+PARTS: Final = frozenset({Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
+SILENT: Final = frozenset({Kind.NO_LINK, Kind.STALE}) | PARTS
 
 
 def overloaded(robot: Robot, *, is_ours: bool) -> tuple[str, ...]:
@@ -24,13 +25,19 @@ def overloaded(robot: Robot, *, is_ours: bool) -> tuple[str, ...]:
     return (*(THEIRS,) * is_theirs, *(OURS,) * is_ours)
 
 
-def load_first(alarms: Iterable[Alarm], first: tuple[str, ...]) -> Iterator[Alarm]:
+def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> Iterator[Alarm]:
     """Yield the alarms; of what is silent or stale the overloaded computers are checked first.
 
-    Not of what is unplugged: no load takes a port away.
+    Not of what is unplugged: no load takes a port away. Nor, where most of so many `parts` are well, of those
+    that are not: a load makes all of them late, so it is named after their own cable.
     """
-    for one in alarms:
-        if first and one.kind in SILENT and UNPLUGGED not in one.what:
-            yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, one.check))))
-        else:
+    found = list(alarms)
+    is_common = 2 * sum(one.kind in PARTS for one in found) >= parts
+    for one in found:
+        if not first or one.kind not in SILENT or UNPLUGGED in one.what:
             yield one
+        elif one.kind in PARTS and not is_common:
+            also = (text.replace(" first", "") for text in first)
+            yield dataclasses.replace(one, check="; also ".join(filter(None, (one.check, *also))))
+        else:
+            yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, one.check))))

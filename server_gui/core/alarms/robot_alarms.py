@@ -64,7 +64,8 @@ class Facts:
 
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
-    return load_first(_found(facts), overloaded(facts.robot, is_ours=facts.is_overloaded))
+    first = overloaded(facts.robot, is_ours=facts.is_overloaded)
+    return load_first(_found(facts), first, len(facts.robot.parts))
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:

@@ -11,8 +11,8 @@ from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.own_load import EVERY_S, LASTS_S, OLD_S, OwnLoad
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.events import Resources
-from tests.support.desk import Bench, described, looked, resources, walking
+from server_gui.core.follow.events import Looked, Resources
+from tests.support.desk import JOINTS, Bench, described, looked, resources, walking
 
 CABLE = check_of(Kind.LOST, "joint")
 
@@ -25,6 +25,16 @@ def station(monkeypatch: pytest.MonkeyPatch) -> Station:
     station = Bench(Desk()).add("exo-01")
     station.take([described(), walking(50), looked(state="lost", problem="no heartbeat")])
     return station
+
+
+PARTS = ["gait", "left_insole", "right_insole", "trunk", *JOINTS]
+
+
+def all_lost() -> Looked:
+    """Return that nothing comes from any device."""
+    one = looked(state="lost", problem="no heartbeat")
+    quality = dict.fromkeys(PARTS, one.quality.quality["left_knee"])
+    return dataclasses.replace(one, quality=replace(one.quality, quality=quality))
 
 
 def busy(percent: float) -> Resources:
@@ -41,12 +51,17 @@ def check(station: Station) -> str:
     ("percent", "is_ours", "first"),
     [(21.5, False, ()), (97.0, False, (THEIRS,)), (21.5, True, (OURS,)), (97.0, True, (THEIRS, OURS))],
 )
-def test_an_overloaded_computer_is_said_before_the_cable(
+def test_an_overloaded_computer_is_said_before_the_cable_of_what_is_not_the_only_one(
     station: Station, percent: float, is_ours: bool, first: tuple[str, ...]
 ) -> None:
+    """A load makes all of them late: of one node among well ones its cable is looked at first."""
     station.take([busy(percent)])
     station.is_overloaded = lambda: is_ours
-    assert check(station) == "; then ".join((*first, CABLE))
+    assert check(station) == "; also ".join((CABLE, *(one.replace(" first", "") for one in first)))
+    station.take([all_lost()])
+    checks = [one.alarm.check for one in station.alarms.active if one.alarm.kind is Kind.LOST]
+    assert checks
+    assert all(one.startswith("; then ".join(first)) for one in checks)
 
 
 def test_no_load_is_blamed_for_a_port_that_is_gone(station: Station) -> None:
