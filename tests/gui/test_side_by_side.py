@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QMenu
 
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.side_by_side import By
@@ -67,6 +68,7 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one
     assert player.beside_bar.by.currentText() == "their beginnings"
     assert scene.beside_text().endswith("played together"), "aligned as is chosen above, and in no second way"
     assert rules.out_of_reach(player) == []
+    assert player.signals.cards[0].visibleRegion().boundingRect().height() > 0, "curves are in sight"
     player.beside_bar.close_button.click()
     shown.draw()
     assert player.signals.scene.beside is None
@@ -116,3 +118,23 @@ def _cannot_be_read(shown: Shown, player: Player, monkeypatch: pytest.MonkeyPatc
     player.beside.close()
     player.beside_bar.refresh()
     assert not player.beside_bar.isVisible()
+
+
+def test_events_of_both_are_on_the_bar_and_in_the_list(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    first, second = jump(shown, archive, player, 2.0)
+    for playback, seconds in ((archive.playback, 3.0), (player.beside.second, 5.0)):
+        tape = first if playback is archive.playback else second
+        at_ns = tape.first_ns + round(seconds * 1e9)
+        playback.happened.tell([{"what": "stop", "who": "ada", "reason": f"at {seconds}", "utc_ns": at_ns}])
+    player._refresh_words()
+    menu = QMenu()
+    player._list_events(menu)
+    said = [action.text() for action in menu.actions() if "at " in action.text()]
+    assert [text.partition(":")[2] for text in said] != []
+    assert any(text.startswith("0:03.0  stop") for text in said)
+    assert any(text.startswith("0:05.0  ┅ stop") for text in said)
+    player._turn(1)
+    player._turn(1)
+    assert archive.playback.position_ns == first.first_ns + 5_000_000_000

@@ -1,8 +1,9 @@
 """A second recording beside the one that is played, aligned by their beginnings or by a heel strike."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from enum import Enum
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ from ml.store.sessions import Session
 from server_gui.core.archive.playback import LEAD_NS, Piece, Playback, PlayedRobot
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Shown
+from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.settings.server_file import ServerSettings
@@ -125,6 +127,13 @@ class SideBySide:
     def station(self) -> Station | None:
         """What is beside, once it is there."""
         return self.second.desk.selected
+
+    @property
+    def flags(self) -> Sequence[Flag]:
+        """What happened in it, on the axis of the first."""
+        if self.second.tape is None:
+            return ()
+        return [replace(one, at_ns=one.at_ns - self._offset_ns) for one in self.second.happened.flags]
 
     def step(self) -> None:
         """Show what is at the instant of the first; a jump of it, or its *play*, tries what failed again."""

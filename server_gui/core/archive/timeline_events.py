@@ -8,7 +8,6 @@ from typing import Any, Final
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.flags import (
     Entry,
-    Flag,
     FlagKind,
     Flags,
     StateWatch,
@@ -56,14 +55,6 @@ class TimelineEvents:
     def is_looking(self) -> bool:
         """Whether more may be found."""
         return self._tape is not None and not self.problem and self.until_ns <= self._tape.last_ns
-
-    def next(self, after_ns: int) -> Flag | None:
-        """Return the first after an instant."""
-        return next((flag for flag in self.flags if flag.at_ns > after_ns), None)
-
-    def last(self, before_ns: int) -> Flag | None:
-        """Return the last before an instant."""
-        return next((flag for flag in reversed(list(self.flags)) if flag.at_ns < before_ns), None)
 
     def _look(self, tape: Tape, words: Words, watch: StateWatch, *, coded: bool = False) -> None:
         """Look through a piece: with the drives' error codes only where one falls into a fault."""

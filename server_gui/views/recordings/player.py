@@ -23,9 +23,11 @@ from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS, PlayedRobot
 from server_gui.core.archive.recorded_notes import RecordedNotes
 from server_gui.core.archive.side_by_side import SideBySide
+from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
+from server_gui.core.desk.flags import Flag
 from server_gui.core.workspace.alignment import Align
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
@@ -37,7 +39,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.scroll_area import ScrollArea
+from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
 from server_gui.views.workspace.page import AROUND_S, Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
@@ -61,7 +63,7 @@ class Player(QWidget):
         self._theme = theme
         self._frame = 0
         self._worded = 0, False  # the instant of which the words are, and whether it was being read
-        self._told: object = None  # which recording and journal have been told of
+        self._told: dict[TimelineEvents, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
@@ -75,6 +77,7 @@ class Player(QWidget):
         )
         self.beside_bar = BesideBar(self.beside)
         self._views = (self.overview, self.signals)
+        self._is_beside_new = False
         self._was_wrong = False  # in what was played of it
         self._around: tuple[str, int] | None = None  # a channel and an instant, to be shown once it is read
         self._stack = QStackedWidget()
@@ -92,7 +95,7 @@ class Player(QWidget):
         self.timeline.moved.connect(self._playback.seek)
         self.timeline.toggled.connect(self._toggle)
         self.timeline.turned.connect(self._turn)
-        self._flagged = -1  # revision of what is shown
+        self._flags: tuple[tuple[Flag, ...], tuple[Flag, ...]] = ((), ())  # of it, and of what is beside it
         self.labels = LabelBar(archive.labels, self.timeline, theme)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
@@ -183,6 +186,10 @@ class Player(QWidget):
         if station is not None and (scene.beside is None or scene.beside.station is not station):
             scene.put_beside(station)
             scene.align = Align.NOW
+            self._is_beside_new = True
+        elif self._is_beside_new and self.signals.cards:
+            self._is_beside_new = False
+            bring_into_sight(self.signals.cards[0])  # tools and channels may take all of a small screen
 
     # --- how it is put together
 
@@ -255,8 +262,8 @@ class Player(QWidget):
         known = f" · events not known: {happened.problem}" if happened.problem else ""
         looking = " · looking for events …" if happened.is_looking else known
         set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
-        self._refresh_flags(tape)
-        has_events = bool(len(happened.flags))  # as the time axis shows them
+        self._refresh_flags()
+        has_events = bool(self._in_order)  # as the time axis shows them
         self.events.setEnabled(has_events)
         set_tip(self.events, EVENTS_HINT if has_events else NO_EVENTS_HINT)
         self._refresh_alarms()
@@ -272,29 +279,46 @@ class Player(QWidget):
         is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
         self.alarms.setVisible(self._was_wrong and not is_in_the_way)
 
-    def _refresh_flags(self, tape: Tape) -> None:
-        journals, happened = self._archive.journals, self._playback.happened
-        journals.look()
-        kept = journals.found.by_robot.get(tape.session.robot)
-        seen = (tape, journals.revision)
-        if seen != self._told and kept is not None:
-            self._told = seen
+    def _refresh_flags(self) -> None:
+        self._archive.journals.look()
+        for playback in (self._playback, self.beside.second):
+            if playback.tape is not None:
+                self._tell(playback.happened, playback.tape)
+        flags = tuple(self._playback.happened.flags), tuple(self.beside.flags)
+        if flags != self._flags:
+            self._flags = flags
+            self.timeline.show_flags(*flags)
+
+    def _tell(self, happened: TimelineEvents, tape: Tape) -> None:
+        """Tell it what the robot's journal has of that time."""
+        journals = self._archive.journals
+        kept, told = journals.found.by_robot.get(tape.session.robot), (tape, journals.revision)
+        if kept is not None and self._told.get(happened) != told:
+            self._told[happened] = told
             happened.tell(entry for stretch in kept.stretches for entry in stretch)
-        if happened.flags.revision != self._flagged:
-            self._flagged = happened.flags.revision
-            self.timeline.show_flags(tuple(happened.flags))
 
     def _list_events(self, menu: QMenu) -> None:
         tape = self._playback.tape
         menu.clear()
-        for flag in self._playback.happened.flags if tape is not None else ():
-            at = clock_text((flag.at_ns - tape.first_ns) / SECOND_NS, 1) if tape is not None else ""
-            text = plain(f"{at}  {flag.kind.value}: {flag.text}").replace("&", "&&")
+        if tape is None:
+            return
+        for flag in self._in_order:
+            at = clock_text((flag.at_ns - tape.first_ns) / SECOND_NS, 1)
+            text = plain(f"{at}  {self.timeline.told(flag)}").replace("&", "&&")
             menu.addAction(text).triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
 
+    @property
+    def _in_order(self) -> list[Flag]:
+        """What happened in both, within the time of the first."""
+        tape, (ours, beside) = self._playback.tape, self._flags
+        within = (one for one in beside if tape is not None and tape.first_ns <= one.at_ns <= tape.last_ns)
+        return sorted((*ours, *within), key=lambda one: one.at_ns)
+
     def _turn(self, way: int) -> None:
-        happened, at_ns = self._playback.happened, self._playback.position_ns
-        flag = happened.next(at_ns) if way > 0 else happened.last(at_ns)
+        at_ns, found = self._playback.position_ns, self._in_order
+        later = (flag for flag in found if flag.at_ns > at_ns)
+        earlier = (flag for flag in reversed(found) if flag.at_ns < at_ns)
+        flag = next(later if way > 0 else earlier, None)
         if flag is not None:
             self._playback.seek(flag.at_ns)
 

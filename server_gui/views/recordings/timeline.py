@@ -30,6 +30,7 @@ TICKS_S: Final = (1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 4
 HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#aaaa00")
 BAR: Final = 40  # high, at text of 100 %
 LABELLED: Final = 0.42  # of which labels take so much, at its bottom
+DASHED: Final = "┅ "  # begins what is of the recording beside
 MISSING: Final = Mark("triangle", "warn", "something is missing")
 
 
@@ -55,6 +56,7 @@ class Timeline(QWidget):
         self._position_ns = 0
         self._labels: Sequence[Label] = ()
         self._flags: Sequence[Flag] = ()
+        self._beside: Sequence[Flag] = ()
         self._outline: Outline | None = None
         self._outlined = -1  # its revision
         self._dragged_from_ns: int | None = None
@@ -71,7 +73,7 @@ class Timeline(QWidget):
 
     def show_tape(self, tape: Tape) -> None:
         """Show another recording."""
-        self._tape, self._labels, self._flags, self.span_ns = tape, (), (), None
+        self._tape, self._labels, self._flags, self._beside, self.span_ns = tape, (), (), (), None
         self.show_position(tape.first_ns)
 
     def show_position(self, position_ns: int) -> None:
@@ -86,9 +88,9 @@ class Timeline(QWidget):
         self._labels = labels
         self.update()
 
-    def show_flags(self, flags: Sequence[Flag]) -> None:
-        """Show what happened when."""
-        self._flags = flags
+    def show_flags(self, flags: Sequence[Flag], beside: Sequence[Flag] = ()) -> None:
+        """Show what happened when; `beside`: in a second recording, dashed as its curves are."""
+        self._flags, self._beside = flags, beside
         self.update()
 
     def show_outline(self, outline: Outline) -> None:
@@ -96,6 +98,10 @@ class Timeline(QWidget):
         if outline.revision != self._outlined:
             self._outline, self._outlined = outline, outline.revision
             self.update()
+
+    def told(self, flag: Flag) -> str:
+        """Return what happened, in words."""
+        return f"{'' if flag in self._flags else DASHED}{flag.kind.value}: {flag.text}"
 
     def choose(self, begin_ns: int, end_ns: int) -> None:
         """Choose a span."""
@@ -132,7 +138,7 @@ class Timeline(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         flag = self._flag_at(event.position())
-        set_tip(self, TIP if flag is None else f"{self._since(flag)}  {flag.kind.value}: {flag.text}")
+        set_tip(self, TIP if flag is None else f"{self._since(flag)}  {self.told(flag)}")
         if self._tape is None or not event.buttons() & Qt.MouseButton.LeftButton:
             return
         at_ns = self._instant(event.position().x())
@@ -182,6 +188,7 @@ class Timeline(QWidget):
         for happened in self._tape.events:
             if happened["kind"] not in TOLD:
                 self._draw_mark(painter, bar, MISSING, utc_ns(happened["utc"]))
+        self._draw_beside(painter, bar)
         for flag in self._flags:
             self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)
         x = self._x(self._position_ns)
@@ -254,6 +261,20 @@ class Timeline(QWidget):
             place = QRectF(x - self._theme.px(30), bar.bottom() + 4, self._theme.px(60), self._theme.px(14))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter, clock_text(tick))
 
+    def _draw_beside(self, painter: QPainter, bar: QRectF) -> None:
+        """Through the bar, with a smaller mark: what happened in the second recording."""
+        for flag in self._beside:
+            if not self._is_within(flag):
+                continue
+            mark, x, side = FLAGS[flag.kind], self._x(flag.at_ns), float(self._theme.px(8))
+            colour = self._theme.colour(mark.colour)
+            painter.setPen(QPen(colour, 1, Qt.PenStyle.DashLine))
+            painter.drawLine(QPointF(x, bar.top()), QPointF(x, bar.bottom()))
+            draw(painter, mark, colour, QRectF(x - side / 2, bar.top() - side - 1, side, side))
+
+    def _is_within(self, flag: Flag) -> bool:
+        return self._tape is not None and self._tape.first_ns <= flag.at_ns <= self._tape.last_ns
+
     def _draw_mark(self, painter: QPainter, bar: QRectF, mark: Mark, at_ns: int) -> None:
         side = float(self._theme.px(11))
         x = self._x(at_ns)
@@ -267,9 +288,10 @@ class Timeline(QWidget):
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)
-        found = ((abs(self._x(flag.at_ns) - place.x()), place_) for place_, flag in enumerate(self._flags))
+        flags = [*self._flags, *filter(self._is_within, self._beside)]
+        found = ((abs(self._x(flag.at_ns) - place.x()), place_) for place_, flag in enumerate(flags))
         distance, which = min(found, default=(near + 1, 0))
-        return self._flags[which] if distance <= near else None
+        return flags[which] if distance <= near else None
 
     def _since(self, flag: Flag) -> str:
         return clock_text(self._since_s(flag.at_ns), 1)

@@ -14,6 +14,7 @@ from server_gui.core.archive.playback import Playback
 from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, By, SideBySide
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Shown
+from server_gui.core.desk.flags import FlagKind
 from server_gui.core.settings.server_file import ServerSettings
 
 SECOND_NS = 1_000_000_000
@@ -158,3 +159,14 @@ def test_without_a_heel_strike_the_beginnings_stay_aligned(beside: Beside) -> No
     assert beside.both.by is By.START
     beside.jump(5.0)
     assert beside.is_together
+
+
+def test_what_happened_in_the_second_stands_on_the_axis_of_the_first(beside: Beside) -> None:
+    at_ns = beside.second.first_ns + 12 * SECOND_NS
+    beside.both.second.happened.tell([{"what": "stop", "who": "ada", "utc_ns": at_ns}])
+    (flag,) = beside.both.flags
+    assert (flag.kind, flag.at_ns - beside.tape.first_ns) == (FlagKind.STOP, 12 * SECOND_NS)
+    beside.both._offset_ns += 2 * SECOND_NS
+    assert beside.both.flags[0].at_ns - beside.tape.first_ns == 10 * SECOND_NS
+    beside.both.close()
+    assert not beside.both.flags
