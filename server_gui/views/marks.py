@@ -1,5 +1,6 @@
 """States as shapes: draws what `server_gui.core.alarms.marks` calls them."""
 
+import datetime
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF
@@ -28,6 +29,7 @@ __all__ = [
     "drives_mark",
     "enabled_text",
     "state_mark",
+    "time_of_day",
 ]
 
 # Where there is no room for a state's own words.
@@ -86,3 +88,8 @@ def _polygon(shape: str, box: QRectF) -> QPolygonF:
             QPointF(box.left(), middle.y()),
         ]
     )
+
+
+def time_of_day(utc_s: float) -> str:
+    """Return an instant by the local clock."""
+    return f"{datetime.datetime.fromtimestamp(utc_s, datetime.UTC).astimezone():%H:%M:%S}"

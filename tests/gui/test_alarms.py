@@ -463,3 +463,20 @@ def test_the_list_of_alarms_is_no_higher_than_its_rows(window: MainWindow, bench
     settle(window, bench)
     assert window.alarms.list.height() < window.height() / 2
     assert rules.cut_words(window, [row.headline for row in window.alarms.list.rows]) == []
+
+
+def test_how_to_go_on_after_a_stop_is_whole_before_it_is_said_who_has_stopped(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    """With large text it ended in an ellipsis, below a line about the address of this window."""
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    bench.station.take([walking(10), looked()])
+    stopping = bench.station.stopping
+    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    stopping.described(held=True, reason="STOP button of the window, by gwrms gui (127.0.0.1:46564)")
+    bench.draw(window)
+    assert "confirmed by all 6 drives" in window.alarms.headline.text()
+    said = window.alarms.details.text()
+    assert said.startswith("since ")
+    assert said.endswith("then enable the drives: start the robot's controller again")

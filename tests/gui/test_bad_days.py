@@ -79,7 +79,8 @@ def test_two_robots_with_one_name_are_told_apart_wherever_they_are_named(
         "exo-01 at 127.0.0.1:7421",
     ]
     assert around.header.stop.text() == "STOP  exo-01 at 127.0.0.1:7420"
-    assert bench.desk.news.items[0].robot == "exo-01 at 127.0.0.1:7421"
+    newest = around.events.lines[len(around.events.pinned)]
+    assert newest.robot == "exo-01 at 127.0.0.1:7421"
     assert "give one another [robot] name" in bench.desk.news.items[0].text
     around.header.stop.pressed.emit()
     other.take([described("exo-02")])

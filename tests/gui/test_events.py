@@ -10,7 +10,7 @@ from server_gui.core.follow.news import NewsKind
 from server_gui.views.frame.main_window import MainWindow
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import CAUSE, fault
-from tests.support.desk import looked, walking
+from tests.support.desk import described, looked, walking
 
 
 def test_an_event_leads_to_its_instant_in_the_signals_that_are_shown(
@@ -90,3 +90,17 @@ def test_events_of_the_only_robot_do_not_spend_their_room_on_its_name(around: Ar
     bench.draw(around)
     assert not around.events.table.isColumnHidden(2)
     assert said(len(around.events.pinned) + 1) != "recording: the disk is full"
+
+
+def test_what_a_robot_did_before_it_said_its_name_stands_under_that_name(
+    around: Around, bench: Bench
+) -> None:
+    """It stood under an address: two robots seemed to be three."""
+    other = bench.add("127.0.0.1-7421", 7421)
+    other.tell(NewsKind.LINK, "reached at last")
+    other.take([described("simulated-exo")])
+    bench.draw(around)
+    assert {line.robot for line in around.events.lines if "at last" in line.text} == {"simulated-exo"}
+    bench.desk.remove(other)
+    bench.draw(around)
+    assert {line.robot for line in around.events.lines if "at last" in line.text} == {"simulated-exo"}

@@ -14,6 +14,7 @@ from ml.registry.registry import Registry
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
+from server_gui.core.models.training import NOT_COMPARED, Trained
 from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Tried
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.models.models_table import SIGNED
@@ -134,6 +135,18 @@ def test_what_is_known_of_a_store_that_is_away_promotes_nothing(
     for button in (page.promote, page.back):
         assert not button.isEnabled()
         assert "is not reached" in button.toolTip()
+
+
+def test_what_training_has_said_of_a_model_is_read_again_before_it_is_promoted(
+    shown: Shown, both: tuple[Card, Card], archive: Archive
+) -> None:
+    page, (_, other) = opened(shown), both
+    why = ("not compared with the one that serves: its sessions lack 12 of its channels",)
+    archive.models.trained[other.id] = Trained(other.id, NOT_COMPARED, why)
+    choose(shown, page, other)
+    click(page.promote)
+    shown.until(page.confirm.isVisible, "asked")
+    assert "lack 12 of its channels" in page.confirm.words.text()
 
 
 def test_a_model_serves_only_once_that_was_confirmed(

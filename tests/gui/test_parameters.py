@@ -14,8 +14,9 @@ from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Confirmed, Reverted, Written
 from server_gui.core.follow.events import LinkChanged
+from server_gui.core.tuning.writing import WriteState
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.parameters.panel import NEWS_S, ParametersPanel, _banner
 from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from tests.gui.fakes import Bench
@@ -375,3 +376,14 @@ def test_where_one_joint_cannot_nothing_is_staged_and_it_is_named(
     panel.refresh()
     assert list(bench.station.edits.staged) == ["left_knee.max_torque"]
     assert "right_ankle: it has no max_torque" in panel.banner.text()
+
+
+def test_what_came_of_a_write_is_green_while_it_is_news(
+    panel: ParametersPanel, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The end of a trial stood there in green for the rest of the day."""
+    writing = bench.station.writing
+    writing.say(WriteState.DONE, "taken back")
+    assert _banner(bench.station, 0, "") == ("taken back", "good")
+    monkeypatch.setattr(writing, "said_s", writing.said_s - NEWS_S)
+    assert _banner(bench.station, 0, "") == ("taken back", "plain")

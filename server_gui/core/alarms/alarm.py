@@ -10,6 +10,7 @@ from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 
 ASIDE: Final = re.compile(r" \([^()]*\)$")
+MORE: Final = " …"  # there is more, which stands in the list
 SHORT: Final = 100  # letters that have room on a card
 
 
@@ -75,13 +76,13 @@ class Alarm:
     def brief(self) -> str:
         """The line where there is little room: of several reasons the first, and that there are more."""
         first, more, _ = self.what.partition("; ")
-        return self._said(f"{first} …" if more and len(self.what) > SHORT else self.what)
+        return self._said(f"{first}{MORE}" if more and len(self.what) > SHORT else self.what)
 
     @property
     def least(self) -> str:
         """The line with the cause alone, where what to check needs the room: the list has all of it."""
         first = ASIDE.sub("", self.what.partition("; ")[0])
-        return self._said(self.what if first == self.what else f"{first} …")
+        return self._said(self.what if first == self.what else f"{first}{MORE}")
 
     def _said(self, what: str) -> str:
         return ": ".join(filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), what)))

@@ -185,7 +185,7 @@ class Station:
 
     def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
         """Note something about this robot, or about a component of it."""
-        self.news.add(kind, self.title, text, about)
+        self.news.add(kind, self.name, text, about)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""

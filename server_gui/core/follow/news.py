@@ -37,7 +37,10 @@ DONE: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One thing that happened, at `utc_s` the last and at `first_s` the first of `count` times."""
+    """One thing that happened, at `utc_s` the last and at `first_s` the first of `count` times.
+
+    `robot` is its name at the desk, which stays, or a part of this program.
+    """
 
     utc_s: float
     kind: NewsKind

@@ -36,6 +36,7 @@ class ModelChange:
     names: Mapping[str, str]  # of models by their ids
     is_signed: bool  # whether this desk has a key to sign it with
     is_anew: bool = False  # what serves unsigned is said again, signed
+    judged: str = ""  # what its training said of it, where this window knows
 
     @property
     def changes_nothing(self) -> bool:
@@ -66,6 +67,8 @@ class ModelChange:
             return
         yield f"Serves now: {self._told(self.now)}."
         yield f"Will serve: {self._told(self.then)}."
+        if self.judged:
+            yield f"Training has judged it: {self.judged}"
         if self.then is None:
             yield "What serves then is what does so for every robot, or what came with GWRMS."
         yield f"{SOON} {'' if self.robot else OWN}".rstrip()

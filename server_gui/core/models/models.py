@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Set
+from dataclasses import replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
@@ -105,7 +106,8 @@ class Models:
         if judged is not None and not judged.may_serve:
             self._say(NOT_BETTER.format(why=judged.reasons), Tone.BAD)
             return
-        self._ask(lambda: promotion(self.url, model, robot))
+        said = "" if judged is None else judged.said
+        self._ask(lambda: replace(promotion(self.url, model, robot), judged=said))
 
     def ask_rollback(self, task: str, robot: str) -> None:
         """Find out what it would change, for `change` to be confirmed."""

@@ -53,6 +53,7 @@ class WriteProgress:
 
     state: WriteState = WriteState.IDLE
     text: str = ""
+    said_s: float = 0.0  # when, on our monotonic clock
     rows: dict[str, str] = field(default_factory=dict)
     trial: Trial | None = None
     undo: collections.deque[Mapping[str, Number]] = field(
@@ -114,7 +115,7 @@ class WriteProgress:
         self._set(WriteState.DONE, text)
 
     def _set(self, state: WriteState, text: str) -> None:
-        self.state, self.text = state, text
+        self.state, self.text, self.said_s = state, text, time.monotonic()
         self.revision += 1
 
 

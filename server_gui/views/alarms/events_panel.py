@@ -1,6 +1,5 @@
 """What happened, newest first, with what still lasts on top: links, faults, writes, stops, control."""
 
-import datetime
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from server_gui.core.desk.recording import WHO
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
 from server_gui.views.alarms.words import gathered
+from server_gui.views.marks import time_of_day
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
@@ -71,13 +71,16 @@ class NewsModel(QAbstractTableModel):
         self.lines: list[EventRow] = []
         self.pinned = 0  # lines that are active alarms
         self._revision: object = None
+        self._titles: dict[str, str] = {}  # of robots by their names, also of those that were removed
 
     def refresh(self) -> None:
         """Take what is new."""
         alarms = (self._desk.recording.alarms, *(one.alarms for one in self._desk.stations))
-        revision = (self._desk.news.revision, *(one.revision for one in alarms))
+        titles = {one.name: one.title for one in self._desk.stations}
+        revision = (self._desk.news.revision, *(one.revision for one in alarms), *titles.values())
         if revision != self._revision:
             self._revision = revision
+            self._titles |= titles
             self._take()
 
     def choose(self, kinds: frozenset[NewsKind], words: Sequence[str]) -> None:
@@ -88,9 +91,9 @@ class NewsModel(QAbstractTableModel):
     def _take(self) -> None:
         worst_first = sorted(gathered(self._desk), key=lambda told: told[1].alarm.rank)  # few are in sight
         active = [_of_alarm(*told) for told in worst_first]
-        alarms = {one.title: one.alarms for one in self._desk.stations}
+        alarms = {one.name: one.alarms for one in self._desk.stations}
         news = (
-            _of_item(item, event_mark(item, alarms.get(item.robot)))
+            _of_item(item, self._titles.get(item.robot, item.robot), event_mark(item, alarms.get(item.robot)))
             for item in self._desk.news.items
             if item.kind in self._kinds
         )
@@ -231,14 +234,10 @@ def _of_alarm(station: Station | None, one: Active) -> EventRow:
     known = station is not None and alarm.channel is not None and one.at_ns is not None
     at = (station, str(alarm.channel), one.at_ns or 0) if station is not None and known else None
     who = WHO if station is None else station.title
-    return EventRow(f"since {_clock(one.since_s)}", alarm.mark, who, text, at)
+    return EventRow(f"since {time_of_day(one.since_s)}", alarm.mark, who, text, at)
 
 
-def _of_item(item: Item, mark: Mark) -> EventRow:
-    again = "" if item.first_s is None else f"  ({item.count} times since {_clock(item.first_s)})"
+def _of_item(item: Item, title: str, mark: Mark) -> EventRow:
+    again = "" if item.first_s is None else f"  ({item.count} times since {time_of_day(item.first_s)})"
     text = f"{item.text}{again}"
-    return EventRow(_clock(item.utc_s), mark, item.robot, text, utc_s=item.utc_s)
-
-
-def _clock(utc_s: float) -> str:
-    return f"{datetime.datetime.fromtimestamp(utc_s, datetime.UTC).astimezone():%H:%M:%S}"
+    return EventRow(time_of_day(item.utc_s), mark, title, text, utc_s=item.utc_s)

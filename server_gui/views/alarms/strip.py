@@ -7,6 +7,7 @@ from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
+from server_gui.core.alarms.alarm import MORE
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
@@ -210,8 +211,9 @@ class AlarmStrip(ClickableFrame):
         ]
         main = next(iter(fits), wordings[-1])
         rest = next((rest for one, rest in told if one == main), "")
-        checked = (pair for pair in told if REMEDY in pair[1])  # what to check goes before what is longer
-        main, rest = next(checked, (main, rest))
+        checked = [pair for pair in told if REMEDY in pair[1]]  # what to check goes before what is longer
+        whole = (pair for pair in checked if MORE not in " ".join(pair))
+        main, rest = next(whole, next(iter(checked), (main, rest)))
         set_text(self.headline, main)
         set_text(self.details, rest)
         self.details.setVisible(bool(rest))

@@ -1,17 +1,16 @@
 """An alarm in words: whose it is and what is wrong, since when, what follows from it, and what to check."""
 
-import datetime
 import time
 from collections.abc import Iterable
 from typing import Final
 
-from server_gui.core.alarms.alarm import Active, Alarm
+from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
-from server_gui.views.marks import Mark
+from server_gui.views.marks import Mark, time_of_day
 
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
@@ -91,8 +90,7 @@ def now_s(station: Station | None) -> float:
 def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
     alarm = one.alarm
-    since = datetime.datetime.fromtimestamp(one.since_s, datetime.UTC).astimezone()
-    first = f"since {since:%H:%M:%S}, for {lasting(max(0.0, now_s - one.since_s))}"
+    first = f"since {time_of_day(one.since_s)}, for {lasting(max(0.0, now_s - one.since_s))}"
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
@@ -102,13 +100,16 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts of decreasing length: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    first = [f"{begins} …" for one in check if (begins := one.partition("; ")[0]) != one]
+    bare = [ASIDE.sub("", one) for one in check]
+    first = [f"{begins}{MORE}" for one in check if (begins := one.partition("; ")[0]) != one]
     with_check = (
         said,
         [since, *said[1:]],
         said[1:],
         [since, *check],
         check,
+        [since, *bare],
+        bare,
         [since, *first] if first else [],
     )
     shorter: tuple[list[str], ...] = (*with_check, first, [since], [])

@@ -32,6 +32,7 @@ EMPTY: Final = (
 PROMOTES: Final = "Let the selected model serve, after showing the change"
 ROLLS_BACK: Final = "Return to the previous model, after showing the change"
 UNREACHED: Final = "The store is not reached: nothing can be promoted or rolled back until it is"
+BEFORE: Final = "as known before"
 AWAY: Final = "▲ The store is not reached; retrying. Below is what was known before: {why}"
 
 
@@ -202,4 +203,6 @@ class ModelsPage(QWidget):
             button.setEnabled(entry is not None and not asked and is_reached)
             set_tip(button, does if is_reached else UNREACHED)
         training_now = " · training" if self._models.is_training else ""
-        self._list.set_note(f"{len(self._models.found.entries)} models{training_now}")
+        known = "" if is_reached else f"{BEFORE} · "
+        self._list.set_note(f"{known}{len(self._models.found.entries)} models{training_now}")
+        self.compare.set_note("" if is_reached else BEFORE)

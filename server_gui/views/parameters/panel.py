@@ -1,5 +1,6 @@
 """The parameters panel: filter, tree, chosen one; review, write or try, undo; a file; storing to flash."""
 
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
@@ -38,6 +39,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
+NEWS_S: Final = 60.0  # that something is as it should be, it is said in green
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
 
@@ -396,5 +398,5 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
     if not station.known:
         return "This robot lets no parameter be changed, or has not said which yet.", "plain"
     if writing.text:
-        return writing.text, "good"
+        return writing.text, "good" if time.monotonic() - writing.said_s < NEWS_S else "plain"
     return "Double-click a value in the column New to change it.", "plain"
