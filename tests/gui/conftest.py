@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 from server_gui.core.desk.desk import Desk
 from server_gui.views.frame.garbage import Garbage
 from server_gui.views.frame.main_window import USUAL, MainWindow
+from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
@@ -104,6 +105,16 @@ def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iter
     leave_unpainted(made)
     made.show()
     bench.draw(made)
+    yield made
+    destroy(made)
+
+
+@pytest.fixture
+def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
+    """The overview alone."""
+    made = Overview(bench.desk, theme)
+    made.resize(1000, 800)
+    made.show()
     yield made
     destroy(made)
 

@@ -5,7 +5,6 @@ import itertools
 import math
 import re
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -26,28 +25,15 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
-from server_gui.core.tuning.writing import Trial
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.marks import time_of_day
 from server_gui.views.overview.joint_table import ANGLE, ERROR, STATE, STOP, TORQUE, JointModel, JointTable
-from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, beside_legs, chain, placed_names
 from server_gui.views.widgets.gait_ring import GaitRing, Phases
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
-from tests.gui.rules import settle
 from tests.support.desk import JOINTS, described, looked, telemetry, walking
-
-
-@pytest.fixture
-def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
-    made = Overview(bench.desk, theme)
-    made.resize(1000, 800)
-    made.show()
-    yield made
-    destroy(made)
 
 
 def cells(model: JointModel, joint: int) -> list[str]:
@@ -328,51 +314,6 @@ def test_enabled_is_no_good_state_after_a_stop_that_is_not_confirmed(
         assert {row[STATE].colour for row in model._cells} == {colour}
 
 
-def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, bench: Bench) -> None:
-    overview.refresh()
-    assert not overview.now.trial.isVisible()
-    until_ns = time.monotonic_ns() + 24 * 10**9
-    trial = Trial(7, {"gait.step_length": 0.42}, {"gait.step_length": 0.4}, until_ns)
-    bench.station.writing.trial = trial
-    overview.read_now()
-    overview.refresh()
-    assert overview.now.trial.isVisible()
-    assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
-    assert overview.now.trial.detail.text().startswith("taken back in ")
-    asked: list[object] = []
-    overview.now.compare.connect(asked.append)
-    overview.now.ab.click()
-    assert asked == [bench.station]
-    overview.now.keep.click()
-    overview.now.take_back.click()
-    assert bench.first.named("confirm") == [(7,)]
-    assert bench.first.named("revert") == [(7,)]
-
-
-@pytest.mark.parametrize("others", [0, 2])
-def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, others: int) -> None:
-    names = ["gait.step_length", "left_knee.max_torque", "right_knee.max_torque"][: 1 + others]
-    until_ns = time.monotonic_ns() + 24 * 10**9
-    trial = Trial(7, dict.fromkeys(names, 0.42), dict.fromkeys(names, 0.4), until_ns)
-    bench.station.writing.trial = trial
-    now = NowLine(bench.desk, theme)
-    now.show()
-    for scale in (1.0, 1.5):
-        theme.set(scale=scale)
-        for width, is_offered in itertools.product(range(220, 1000, 60), (True, False)):
-            now.offer(is_offered)
-            now.resize(round(width * scale), 200)
-            now.refresh()
-            settle()
-            shown, end = now.trial.main, now.trial.detail
-            assert "400 → 420" in shown.shown or f"{1 + others} values" in shown.shown, (width, scale)
-            assert shown.is_whole, (width, scale, shown.shown)
-            assert end.is_whole, (width, scale, end.shown)
-            assert now.keep.isVisible() is is_offered
-    assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
-    destroy(now)
-
-
 def test_a_leg_that_the_robot_does_not_have_is_nowhere(theme: Theme, bench: Bench) -> None:
     """It assists the left one alone, and has both insoles: no zero and no dash for the other's joints."""
     full, rows = described(), walking(600, -3600.0)
@@ -518,18 +459,3 @@ def test_the_order_of_the_overview_stays_as_alarms_and_lines_come_and_go(
         bench.draw(window)
         orders.add(page._joints.y() < page._status.y())
     assert orders == {is_first}
-
-
-def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(
-    overview: Overview, bench: Bench
-) -> None:
-    received_ns = time.monotonic_ns()
-    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
-    bench.station.take([walking(10), looked(), telemetry([received_ns], states, received_ns)])
-    stopping = bench.station.stopping
-    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
-    stopping.answered_ms = 21.0
-    overview.read_now()
-    overview.refresh()
-    assert overview.now.drives.main.text() == f"STOPPED since {time_of_day(stopping.since_s or 0.0)}"
-    assert overview.now.drives.detail.text() == "6/6 confirmed in 21 ms"

@@ -1,0 +1,76 @@
+"""The overview's first line: what is so now, since when, and what is on trial."""
+
+import itertools
+import time
+
+import pytest
+
+from gateway.wire.stop import Stopped
+from server_gui.core.tuning.writing import Trial
+from server_gui.views.marks import time_of_day
+from server_gui.views.overview.now_line import NowLine
+from server_gui.views.overview.page import Overview
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, destroy
+from tests.gui.rules import settle
+from tests.support.desk import JOINTS, looked, telemetry, walking
+
+
+def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, bench: Bench) -> None:
+    overview.refresh()
+    assert not overview.now.trial.isVisible()
+    until_ns = time.monotonic_ns() + 24 * 10**9
+    trial = Trial(7, {"gait.step_length": 0.42}, {"gait.step_length": 0.4}, until_ns)
+    bench.station.writing.trial = trial
+    overview.read_now()
+    overview.refresh()
+    assert overview.now.trial.isVisible()
+    assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
+    assert overview.now.trial.detail.text().startswith("taken back in ")
+    asked: list[object] = []
+    overview.now.compare.connect(asked.append)
+    overview.now.ab.click()
+    assert asked == [bench.station]
+    overview.now.keep.click()
+    overview.now.take_back.click()
+    assert bench.first.named("confirm") == [(7,)]
+    assert bench.first.named("revert") == [(7,)]
+
+
+@pytest.mark.parametrize("others", [0, 2])
+def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, others: int) -> None:
+    names = ["gait.step_length", "left_knee.max_torque", "right_knee.max_torque"][: 1 + others]
+    until_ns = time.monotonic_ns() + 24 * 10**9
+    trial = Trial(7, dict.fromkeys(names, 0.42), dict.fromkeys(names, 0.4), until_ns)
+    bench.station.writing.trial = trial
+    now = NowLine(bench.desk, theme)
+    now.show()
+    for scale in (1.0, 1.5):
+        theme.set(scale=scale)
+        for width, is_offered in itertools.product(range(220, 1000, 60), (True, False)):
+            now.offer(is_offered)
+            now.resize(round(width * scale), 200)
+            now.refresh()
+            settle()
+            shown, end = now.trial.main, now.trial.detail
+            assert "400 → 420" in shown.shown or f"{1 + others} values" in shown.shown, (width, scale)
+            assert shown.is_whole, (width, scale, shown.shown)
+            assert end.is_whole, (width, scale, end.shown)
+            assert now.keep.isVisible() is is_offered
+    assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
+    destroy(now)
+
+
+def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(
+    overview: Overview, bench: Bench
+) -> None:
+    received_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    bench.station.take([walking(10), looked(), telemetry([received_ns], states, received_ns)])
+    stopping = bench.station.stopping
+    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    stopping.answered_ms = 21.0
+    overview.read_now()
+    overview.refresh()
+    assert overview.now.drives.main.text() == f"STOPPED since {time_of_day(stopping.since_s or 0.0)}"
+    assert overview.now.drives.detail.text() == "6/6 confirmed in 21 ms"
