@@ -37,7 +37,7 @@ class ModelsModel(RowsModel[Entry]):
             case Qt.ItemDataRole.DisplayRole:
                 return plain(_cells(entry)[column])
             case _ if role == SORT_ROLE:
-                return entry.card.made.timestamp() if column == NAME else _keys(entry)[column]
+                return -entry.card.made.timestamp() if column == AGE else _cells(entry)[column]
             case Qt.ItemDataRole.ToolTipRole:
                 words = "; ".join(entry.signed) if column == SIGNED else ""
                 return tip(f"{words or _cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
@@ -54,7 +54,7 @@ class ModelsTable(RowsTable):
     def __init__(self, model: ModelsModel, theme: Theme) -> None:
         self._theme = theme
         self._rows, self._filtered = model, Filtered(model)
-        super().__init__(self._filtered, "Models", NAME)
+        super().__init__(self._filtered, "Models", AGE, Qt.SortOrder.AscendingOrder)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         columns.prepare(self)
         for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved):
@@ -99,7 +99,3 @@ def _cells(entry: Entry) -> tuple[str, ...]:
         week_short(entry),
         f"{sessions}{SOURCES[card.source]}",
     )
-
-
-def _keys(entry: Entry) -> tuple[Any, ...]:
-    return (*_cells(entry)[:AGE], age_days(entry.card), *_cells(entry)[WEEK:])

@@ -88,14 +88,20 @@ class Filtered(QSortFilterProxyModel):
 
 
 class RowsTable(QTableView):
-    """Highest first by `column`, until somebody clicks another title."""
+    """Highest first by `column`, or lowest, until somebody clicks another title."""
 
-    def __init__(self, model: QSortFilterProxyModel, name: str, column: int) -> None:
+    def __init__(
+        self,
+        model: QSortFilterProxyModel,
+        name: str,
+        column: int,
+        order: Qt.SortOrder = Qt.SortOrder.DescendingOrder,
+    ) -> None:
         super().__init__()
         self.setHorizontalHeader(SortHeader(self))
         self.setModel(model)
         self.setSortingEnabled(True)
-        self.sortByColumn(column, Qt.SortOrder.DescendingOrder)
+        self.sortByColumn(column, order)
         self.setAccessibleName(name)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setTabKeyNavigation(False)
