@@ -29,7 +29,7 @@ STOP_MARKS: Final = {
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Brief, and then left out, in this order where there is less room; alarms stand below the header.
-BRIEF: Final = ("recording", "link")
+BRIEF: Final = ("recording", "link", "drives")
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
 LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
@@ -215,7 +215,9 @@ def _drives(station: Station) -> Words:
     if not station.is_live:
         return Words(Mark("ring", "old"), "Drives not known", (*counts, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
-    return Words(mark, mark.word.capitalize(), (*counts, "CiA 402"))
+    few = SHORTER.get(mark.word, mark.word).capitalize()
+    brief = (few, counts[0].removesuffix(" enabled"), *counts[1:])
+    return Words(mark, mark.word.capitalize(), (*counts, "CiA 402"), brief=brief)
 
 
 def _status(station: Station) -> Words:

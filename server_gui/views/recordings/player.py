@@ -46,6 +46,7 @@ ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone be
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
 EVENTS_HINT: Final = "Its events; choose one to see its instant"
 NO_EVENTS_HINT: Final = "Nothing happened in it: no mark, no change of a drive, no line of the journal"
+NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SLOW: Final = 5  # frames between two looks at what people read
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)
@@ -189,7 +190,9 @@ class Player(QWidget):
             self._is_beside_new = True
         elif self._is_beside_new and self.signals.cards:
             self._is_beside_new = False
-            bring_into_sight(self.signals.cards[0])  # tools and channels may take all of a small screen
+            bring_into_sight(
+                self.signals.cards[0], first=True
+            )  # tools and channels may take all of a small screen
 
     # --- how it is put together
 
@@ -335,7 +338,8 @@ class Player(QWidget):
         if then is None:
             return what
         is_said = then.mark.word not in (STOPPED, UNSEEN)
-        return f"{what} · {f'predicted then: {then.text}' if is_said else then.text.lower()}"
+        said = then.text.replace(" ", NO_BREAK)
+        return f"{what} · {f'predicted then: {said}' if is_said else then.text.lower()}"
 
     def _tone(self, tone: str) -> None:
         if self.banner.property("tone") != tone:

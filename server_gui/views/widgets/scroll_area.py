@@ -1,6 +1,6 @@
 """A view that is scrolled where the screen is small or the text large, rather than the window made larger."""
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QScrollArea, QWidget
 
@@ -26,8 +26,8 @@ class ScrollArea(QScrollArea):
             field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
             field.installEventFilter(self)
 
-    def show_part(self, part: QWidget) -> None:
-        """Scroll to a part that has just come, once it has its place."""
+    def show_part(self, part: QWidget, *, first: bool = False) -> None:
+        """Scroll to a part that has just come, once it has its place; `first`: to its top."""
         view = self.widget()
         layout = None if view is None else view.layout()
         if view is None or layout is None:
@@ -35,7 +35,10 @@ class ScrollArea(QScrollArea):
         layout.activate()
         self._grow()
         QApplication.sendPostedEvents(view, QEvent.Type.LayoutRequest.value)
-        self.ensureWidgetVisible(part, 0, 0)
+        if first:
+            self.verticalScrollBar().setValue(part.mapTo(view, QPoint(0, 0)).y())
+        else:
+            self.ensureWidgetVisible(part, 0, 0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Wheel and isinstance(watched, QComboBox | QAbstractSpinBox):
@@ -63,7 +66,7 @@ class ScrollArea(QScrollArea):
             view.setMinimumHeight(0)
 
 
-def bring_into_sight(part: QWidget) -> None:
+def bring_into_sight(part: QWidget, *, first: bool = False) -> None:
     """Scroll to a part that has just been shown, where its page is scrolled at all."""
 
     def show() -> None:
@@ -71,6 +74,6 @@ def bring_into_sight(part: QWidget) -> None:
         while parent is not None and not isinstance(parent, ScrollArea):
             parent = parent.parentWidget()
         if parent is not None and part.isVisible():
-            parent.show_part(part)
+            parent.show_part(part, first=first)
 
     QTimer.singleShot(0, part, show)  # once layouts have noticed it
