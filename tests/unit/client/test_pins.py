@@ -138,7 +138,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_two_robots_at_one_address_each_have_their_own_pin(file: Path) -> None:
-    """As behind one forwarded port, one today and the other tomorrow: the first one's pin was asked of both."""
+    """As behind one forwarded port, one today and another tomorrow: the first one's pin was asked of both."""
     file.write_text(
         "[robots]\n"
         f'exo-1 = {{ address = "127.0.0.1:7420", pin = "{"a" * 64}" }}\n'
