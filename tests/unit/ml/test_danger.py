@@ -1,6 +1,7 @@
 """Danger: unknown is never fine, evidence never speaks against danger, thresholds keep their budgets."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -206,10 +207,8 @@ def test_what_is_like_nothing_before_is_compared_with_nothing_for_a_while(
     assert silent == [set(), set(COMPARE), set(COMPARE), set()]
 
 
-def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """It was called over: of that joint nobody knew anything any more."""
+def judged(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., list[Level]]]:
+    """Spreads of the detectors to be set, and the levels in the next seconds, each once, while `lost` is."""
     above = np.zeros(len(DETECTORS))
     monkeypatch.setattr(Evidence, "take", lambda _self, _at_s, _values: above.copy())
     monkeypatch.setattr(Evidence, "why", lambda _self, _above: ("the left knee lags",))
@@ -224,6 +223,33 @@ def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
             found.append(watch.take(stamp_ns, row))
         return list(dict.fromkeys(one.level for one in found if one is not None))
 
+    return above, levels
+
+
+def test_a_lower_level_by_what_is_still_seen_is_told_while_what_raised_a_higher_one_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A robot that was in danger still, by another joint, was of unknown danger."""
+    above, levels = judged(monkeypatch)
+    odds = {Level.STOP: 50.0, Level.NONE: -50.0}
+    odds |= {level: CALIBRATION.by_level[level] for level in (Level.EARLY, Level.ALARM)}
+    monkeypatch.setattr(Calibration, "log_odds", lambda _self, above: odds[Level(int(above[0]))])
+    above[0] = Level.STOP
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = Level.ALARM
+    assert levels(CALM_S + 2.0, "left_knee") == [Level.STOP, Level.ALARM]
+    above[0] = Level.EARLY
+    assert levels(CALM_S + 2.0, "left_knee")[-1] is Level.EARLY
+    above[0] = Level.NONE
+    assert levels(CALM_S + 2.0, "left_knee")[-1] is Level.UNKNOWN, "the stop may last, unseen"
+    assert levels(1.0) == [Level.NONE]
+
+
+def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was called over: of that joint nobody knew anything any more."""
+    above, levels = judged(monkeypatch)
     above[0] = 50.0
     assert levels(1.0)[-1] is Level.STOP
     above[0] = math.nan
