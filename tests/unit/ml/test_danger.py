@@ -20,7 +20,7 @@ from ml.danger.false_alarm_budget import (
     thresholds,
 )
 from ml.danger.levels import CALM_S, HOLD, RELEASE, URGENT, Level, Levels, sustained
-from ml.danger.monitor import COMPARE, STRANGE_S, DangerMonitor, Evidence
+from ml.danger.monitor import COMPARE, HARM_S, STRANGE_S, DangerMonitor, Evidence
 from ml.danger.nearest_neighbours import NearestNeighbours
 from ml.danger.observation import CHANNELS
 
@@ -214,7 +214,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., l
     monkeypatch.setattr(Evidence, "why", lambda _self, _above: ("the left knee lags",))
     watch, stamp_ns = DangerMonitor(CALIBRATION), 0
 
-    def levels(seconds: float, lost: str = "nothing") -> list[Level]:
+    def levels(seconds: float, lost: str | tuple[str, ...] = "nothing") -> list[Level]:
         nonlocal stamp_ns
         found = []
         for _ in range(int(seconds * 25)):
@@ -226,14 +226,18 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., l
     return above, levels
 
 
+def levelled(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., list[Level]]]:
+    """Return the same, where the first detector's spread is the level that it just meets."""
+    odds = {Level.NONE: -50.0, **CALIBRATION.by_level}
+    monkeypatch.setattr(Calibration, "log_odds", lambda _self, above: odds[Level(int(above[0]))])
+    return judged(monkeypatch)
+
+
 def test_a_lower_level_by_what_is_still_seen_is_told_while_what_raised_a_higher_one_is_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A robot that was in danger still, by another joint, was of unknown danger."""
-    above, levels = judged(monkeypatch)
-    odds = {Level.STOP: 50.0, Level.NONE: -50.0}
-    odds |= {level: CALIBRATION.by_level[level] for level in (Level.EARLY, Level.ALARM)}
-    monkeypatch.setattr(Calibration, "log_odds", lambda _self, above: odds[Level(int(above[0]))])
+    above, levels = levelled(monkeypatch)
     above[0] = Level.STOP
     assert levels(1.0)[-1] is Level.STOP
     above[0] = Level.ALARM
@@ -243,6 +247,20 @@ def test_a_lower_level_by_what_is_still_seen_is_told_while_what_raised_a_higher_
     above[0] = Level.NONE
     assert levels(CALM_S + 2.0, "left_knee")[-1] is Level.UNKNOWN, "the stop may last, unseen"
     assert levels(1.0) == [Level.NONE]
+
+
+def test_a_lower_level_does_not_end_either_because_the_joint_that_raised_it_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was over as soon as the higher one was too old to last, by a joint of which nothing is known."""
+    above, levels = levelled(monkeypatch)
+    above[0] = Level.STOP
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = Level.ALARM
+    assert levels(HARM_S - 1.0, "left_knee") == [Level.STOP, Level.ALARM]
+    above[0] = Level.NONE
+    assert Level.NONE not in levels(HARM_S - 1.0, ("left_knee", "right_knee"))
+    assert levels(2.0, ("left_knee", "right_knee"))[-1] is Level.NONE
 
 
 def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
