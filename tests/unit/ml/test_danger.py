@@ -278,6 +278,7 @@ def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
     assert levels(1.0)[-1] is Level.STOP
     above[0] = 0.0
     assert levels(5.0) == [Level.STOP, Level.NONE]
+    assert levels(1.0, "left_knee") == [Level.NONE], "it was seen to be over"
     above[0] = 50.0
     assert levels(1.0)[-1] is Level.STOP
     above[0] = math.nan
