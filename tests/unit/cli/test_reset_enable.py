@@ -110,11 +110,11 @@ def test_a_robot_that_was_stopped_while_its_reset_was_asked_about_stays_stopped(
     powered: FakeRobot, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Slow(Terminal):
-        def readline(self, *_: Any) -> str:
+        def isatty(self) -> bool:
             powered.overrides["robot.describe"] = lambda _params: held(powered)
-            return "y\n"
+            return True
 
-    monkeypatch.setattr("sys.stdin", Slow())
+    monkeypatch.setattr("sys.stdin", Slow("y\n"))
     assert run(powered, "reset") == 1
     assert powered.called("robot.reset") == []
     assert "stopped the robot meanwhile" in capsys.readouterr().err
