@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from gateway.cli.text import did_you_mean, warn
+from gateway.cli.text import YES_OR_NO, did_you_mean, warn
 from gateway.client import (
     Address,
     BadAddress,
@@ -20,7 +20,7 @@ from gateway.client import (
 )
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
 from gateway.client.keys import named
-from gateway.plain_text import followed
+from gateway.plain_text import followed, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
@@ -174,7 +174,7 @@ def ask(question: str, *, yes: bool) -> bool:
         return True
     if not sys.stdin.isatty():
         raise NobodyToAsk("there is no terminal to ask on, and nothing was sent; say --yes to go on")
-    sys.stderr.write(f"{question} [y/N] ")  # the answer to a program is on the standard output
+    sys.stderr.write(plain(question, "\n") + YES_OR_NO)  # a program's answer is on the standard output
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

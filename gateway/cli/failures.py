@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, Final, TextIO, cast
 
-from gateway.cli.text import say_json
+from gateway.cli.text import YES_OR_NO, say_json
 
 KEPT: Final = 8192  # letters of what was said last
 USAGE: Final = 2  # the exit status of what was typed wrong
@@ -46,6 +46,6 @@ def with_error_object(run: Callable[[], int]) -> int:
 
 def _tell(status: int, said: str) -> None:
     kind = "Usage" if status == USAGE else "Failed"
-    lines = said.strip().splitlines()
+    lines = said.rpartition(YES_OR_NO)[2].strip().splitlines()
     message = "\n".join(line.partition(": ")[2] if line.startswith("gwrms") else line for line in lines)
     say_json({"error": {"kind": kind, "message": message.rpartition("error: ")[2]}})

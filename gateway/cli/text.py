@@ -3,6 +3,7 @@
 import difflib
 import sys
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 import msgspec
 
@@ -14,6 +15,7 @@ from gateway.wire.cost import BudgetInfo
 
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole
 OTHER_DECIMALS = 4
+YES_OR_NO: Final = " [y/N] "  # ends a question; its answer is typed after it
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[int] = ()) -> str:

@@ -83,9 +83,10 @@ def named(name: str) -> Address | None:
     try:
         if isinstance(entry, str):
             return Address.parse(entry)
-        where, pin = Address.parse(str(entry["address"])), entry.get("pin")
+        table: Mapping[str, Any] = entry if isinstance(entry, Mapping) else {}
+        where, pin = Address.parse(str(table.get("address", ""))), table.get("pin")
         return where if pin is None else replace(where, pin=checked_pin(str(pin)))
-    except (ValueError, KeyError, TypeError) as error:
+    except ValueError as error:
         raise BadAddress(
             f"{name} stands in [robots] of {server_file()} and cannot be used: {error}"
         ) from error

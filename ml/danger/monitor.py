@@ -26,6 +26,7 @@ from ml.danger.torque import Torque
 from ml.danger.tracking import Tracking
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 PERIOD_S: Final = 0.035  # rows that come sooner after another are skipped: 25 a second are enough
 JUMP_S: Final = 1.0  # a clock set back by more is a new clock, and the model starts anew
@@ -137,9 +138,7 @@ class DangerMonitor:
         self._held = np.full(len(CHANNELS), np.nan)
         self._held_ns = np.zeros(len(CHANNELS), dtype=np.int64)
         self._taken_ns = -(2**62)
-        self._reached = Level.NONE
-        self._seen_by = np.zeros(len(WATCHED), dtype=np.bool_)  # channels that were there when it was met
-        self._until_s = -math.inf
+        self._met: dict[Level, tuple[Bools, float]] = {}  # channels that were there then; how long it lasts
 
     def take(self, stamp_ns: int, values: Sequence[float | None]) -> DangerVerdict | None:
         """Take a row in the order of `CHANNELS`; return the verdict if one was due.
@@ -179,8 +178,12 @@ class DangerMonitor:
         A lower one that what is still seen gives is told.
         """
         there = np.isfinite(values[WATCHED])
-        if level < self._reached and at_s < self._until_s and bool((self._seen_by & ~there).any()):
-            return level if level > Level.NONE and self._levels.is_met else Level.UNKNOWN
-        if self._levels.is_met or level is not self._reached:
-            self._reached, self._seen_by, self._until_s = level, there, at_s + HARM_S
+        is_met = self._levels.is_met
+        if is_met:
+            self._met[level] = there, at_s + HARM_S
+        higher = [met for one, met in self._met.items() if one > level]
+        if any(at_s < until_s and bool((seen_by & ~there).any()) for seen_by, until_s in higher):
+            return level if level > Level.NONE and is_met else Level.UNKNOWN
+        if higher:
+            self._met = {one: met for one, met in self._met.items() if one <= level}
         return level

@@ -63,6 +63,18 @@ def test_the_worst_alarm_is_the_first_event_also_if_it_is_the_recording_s(
     assert (around.events.pinned[0].robot, colours[:2]) == ("recording", ["bad", "warn"])
 
 
+def test_a_robot_s_alarm_that_is_worse_than_the_recording_s_is_before_it(
+    around: Around, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fault(bench)
+    late = Alarm(Kind.UPLOAD, "", "the store is not reached")
+    monkeypatch.setattr(bench.desk.recording, "_found", lambda: iter([late]))
+    bench.draw(around)
+    told = [(line.robot, line.mark.word) for line in around.events.pinned]
+    assert told[0] == (bench.station.title, "fault")
+    assert told[-1] == ("recording", "store")
+
+
 def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> None:
     bench.desk.news.add(NewsKind.STALE, "exo-01", "right_insole stale")
     bench.desk.news.add(NewsKind.STOP, "exo-01", "STOP confirmed")

@@ -1,12 +1,15 @@
 """gwrms stop, reset and enable: what is not certain is said, and is no success."""
 
 import json
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from gateway.client.keys import server_file
 from gateway.main import main
 from tests.fake_robot import STATES, FakeRobot, Refusal
+from tests.unit.cli.served import Terminal
 
 DOWN, UP = "switch on disabled", "operation enabled"
 
@@ -15,10 +18,9 @@ def run(robot: FakeRobot, *arguments: str) -> int:
     return main([*arguments, "--robot", robot.address])
 
 
-def test_drives_that_are_enabled_while_no_stop_is_held_lose_no_power_unasked(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The advice after a stop of another robot was followed here, and this one walked."""
+@pytest.fixture
+def powered(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeRobot]:
+    """A robot that is enabled, of which no stop is held, and that is reset when it is asked."""
     monkeypatch.setitem(STATES, 5, UP)
     with FakeRobot() as robot:
         robot.overrides["robot.reset"] = lambda _params: {
@@ -26,11 +28,116 @@ def test_drives_that_are_enabled_while_no_stop_is_held_lose_no_power_unasked(
             "problems": {},
             "held": False,
         }
-        assert run(robot, "reset") != 0
-        assert "no terminal to ask on" in capsys.readouterr().err
-        assert robot.called("robot.reset") == []
-        assert run(robot, "reset", "--yes") == 0
-        assert len(robot.called("robot.reset")) == 1
+        yield robot
+
+
+def held(robot: FakeRobot) -> dict[str, Any]:
+    known = FakeRobot.describe(robot)
+    return known | {"stop": known["stop"] | {"held": True, "reason": "somebody fell"}}
+
+
+def test_drives_that_are_enabled_while_no_stop_is_held_lose_no_power_unasked(
+    powered: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The advice after a stop of another robot was followed here, and this one walked."""
+    assert run(powered, "reset") != 0
+    assert "no terminal to ask on" in capsys.readouterr().err
+    assert powered.called("robot.reset") == []
+    assert run(powered, "reset", "--yes") == 0
+    assert len(powered.called("robot.reset")) == 1
+
+
+@pytest.mark.parametrize(("answer", "resets"), [("n\n", 0), ("\n", 0), ("", 0), ("y\n", 1)])
+def test_a_reset_that_takes_power_needs_a_yes_and_asks_beside_what_programs_read(
+    powered: FakeRobot,
+    answer: str,
+    resets: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.stdin", Terminal(answer))
+    assert run(powered, "reset", "--json") == 1 - resets
+    said = capsys.readouterr()
+    assert "under power are: left_hip, left_knee," in said.err
+    assert len(powered.called("robot.reset")) == resets
+    told = json.loads(said.out)
+    if resets:
+        assert told["held"] is False
+    else:
+        assert told["error"]["message"] == "nothing was done"
+
+
+def test_a_question_shows_letters_that_would_command_the_terminal_as_what_they_are(
+    powered: FakeRobot, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A robot tells the names in it, and could hide what the question is about."""
+    monkeypatch.setattr("tests.fake_robot.JOINTS", ("left\x1b[2Jknee",))
+    monkeypatch.setattr("sys.stdin", Terminal("n\n"))
+    assert run(powered, "reset") == 1
+    said = capsys.readouterr().err
+    assert "under power are: left" in said
+    assert "\x1b" not in said
+
+
+@pytest.mark.parametrize(
+    ("state", "asks"),
+    [
+        ("not ready to switch on", False),
+        (DOWN, False),
+        ("ready to switch on", False),
+        ("switched on", True),
+        ("quick stop active", True),
+        ("fault reaction active", True),
+        ("fault", False),
+    ],
+)
+def test_every_drive_that_may_hold_its_joint_is_asked_about(
+    powered: FakeRobot, state: str, asks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(STATES, 5, state)
+    monkeypatch.setattr("sys.stdin", Terminal("n\n"))
+    assert (run(powered, "reset") == 1) is asks
+    assert len(powered.called("robot.reset")) == (not asks)
+
+
+def test_a_held_stop_is_reset_without_a_question(powered: FakeRobot) -> None:
+    powered.overrides["robot.describe"] = lambda _params: held(powered)
+    assert run(powered, "reset") == 0
+    assert len(powered.called("robot.reset")) == 1
+
+
+def test_a_robot_that_was_stopped_while_its_reset_was_asked_about_stays_stopped(
+    powered: FakeRobot, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Slow(Terminal):
+        def isatty(self) -> bool:
+            powered.overrides["robot.describe"] = lambda _params: held(powered)
+            return True
+
+    monkeypatch.setattr("sys.stdin", Slow("y\n"))
+    assert run(powered, "reset") == 1
+    assert powered.called("robot.reset") == []
+    assert "stopped the robot meanwhile" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("method", ["robot.describe", "component.snapshot"])
+@pytest.mark.parametrize("answer", [{"gone": "wrong"}, None])
+def test_a_look_that_fails_does_not_keep_a_fault_from_its_reset(
+    powered: FakeRobot, method: str, answer: object
+) -> None:
+    def refuse(_params: object) -> object:
+        raise Refusal(-32010, "no module answers", kind="unavailable")
+
+    powered.overrides[method] = refuse if answer is None else lambda _params: answer
+    assert run(powered, "reset") == 0
+    assert len(powered.called("robot.reset")) == 1
+
+
+def test_a_reset_that_was_told_yes_looks_at_nothing_first(powered: FakeRobot) -> None:
+    assert run(powered, "reset", "--yes") == 0
+    called = [method for method, _ in powered.calls]
+    assert "component.snapshot" not in called
+    assert "robot.describe" not in called
 
 
 def test_a_reset_takes_the_lease_and_says_that_no_stop_is_held(capsys: pytest.CaptureFixture[str]) -> None:

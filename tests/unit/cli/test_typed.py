@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from gateway.cli.commission_faces import Terminal
-from gateway.cli.line_input import Typed
+from gateway.cli.line_input import Typed, looks_like_stop
 from gateway.cli.motion_ends import MotionEnded, ending
 from gateway.commission.dialogue import Ask
 
@@ -69,7 +69,43 @@ def test_a_terminal_says_that_it_moves_and_looks_at_the_keys(
     os.close(write)
 
 
-@pytest.mark.parametrize("line", ["stop\n", " STOP!\n", '{"stop"\n'])
+@pytest.mark.parametrize(
+    ("text", "is_stop", "is_stop_for_enter"),
+    [
+        ("STOP", True, True),
+        ("STOP STOP", True, True),
+        ("stop! stop!!", True, True),
+        ("please stop", False, True),
+        ("Stop it", False, True),
+        ("stopp", False, True),
+        ("stop_button", False, True),
+        ("left_stop_button", False, True),
+        ("", False, False),
+        ("y", False, False),
+        ("step", False, False),
+    ],
+)
+def test_what_is_a_stop_depends_on_whether_anything_but_enter_can_be_meant(
+    text: str, is_stop: bool, is_stop_for_enter: bool
+) -> None:
+    assert looks_like_stop(text) is is_stop
+    assert looks_like_stop(text, press=True) is is_stop_for_enter
+
+
+def test_a_name_with_stop_in_it_is_an_answer(pipe: tuple[Typed, int]) -> None:
+    terminal = Terminal()
+    terminal.typed, write = pipe
+    os.write(write, b"stop_button\nplease stop\n")
+    os.close(write)
+    with ending():
+        assert [terminal.ask(Ask("What is it called?")) for _ in range(2)] == [
+            "stop_button\n",
+            "please stop\n",
+        ]
+    assert not terminal.stop_asked
+
+
+@pytest.mark.parametrize("line", ["stop\n", " STOP!\n", '{"stop"\n', "STOP STOP\n", "please stop\n"])
 def test_at_a_question_stop_is_no_enter(line: str, pipe: tuple[Typed, int]) -> None:
     """*Then press Enter* took it for one, and the next joint was powered."""
     terminal = Terminal()

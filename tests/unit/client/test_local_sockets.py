@@ -16,7 +16,7 @@ from gateway.cli import serve
 from gateway.client import Address, LinkLost, LinkSettings, NotPaired, Robot, Unreachable, WrongRobot
 from gateway.client.keys import keys_folder
 from gateway.client.local_sockets import listens_at, local_sockets, sockets_instead
-from gateway.connections.listeners import listen_locally
+from gateway.connections.listeners import listen, listen_locally
 from gateway.main import main
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway.harness import HEAD, Bench, config, serving
@@ -172,6 +172,44 @@ def test_localhost_is_the_address_that_was_reached_by_it() -> None:
     for listens in ("[::1]:7420", "[::]:7420"):
         assert not listens_at(Address("localhost"), listens)
         assert listens_at(Address("::1"), listens)
+
+
+@pytest.mark.parametrize(("reached", "expected"), [("127.0.0.1", "exo-test"), ("::1", "at-six")])
+def test_of_two_gateways_at_localhost_the_one_that_was_reached_is_asked_at_its_socket(
+    reached: str, expected: str, address: Address, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        listener = listen("::1", address.port)
+    except OSError:
+        pytest.skip("this computer has no ::1")
+    monkeypatch.setattr("tests.unit.gateway.harness.listen", lambda *_: listener)
+    (tmp_path / "six").mkdir()
+    other = config(keyed(tmp_path / "six"), HEAD.replace("exo-test", "at-six"))
+    family = socket.AF_INET6 if ":" in reached else socket.AF_INET
+    where = (family, socket.SOCK_STREAM, 6, "", (reached, address.port))
+    with serving(other, local=serve._local(other)):
+        monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: [where])
+        with Robot(Address("localhost", address.port), ONCE) as robot:
+            assert robot.hello is not None
+            assert robot.hello.robot == expected
+
+
+def test_a_socket_does_not_stand_in_for_a_port_at_which_nobody_listens(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its gateway may have this address in another network of its own, as a container has."""
+    monkeypatch.setattr("gateway.modules.component.module.assemble", Bench().assemble)
+    robot = config(keyed(tmp_path))
+    with socket.socket() as dead:
+        dead.bind(("127.0.0.1", 0))
+        gone = Address(*dead.getsockname())
+        monkeypatch.setattr("gateway.daemon.said", lambda _: str(gone))
+        with serving(robot, local=serve._local(robot)):
+            with Robot(str(folder / "exo-test.sock"), ONCE) as found:
+                assert found.hello is not None
+                assert found.hello.listens == str(gone)
+            with pytest.raises(Unreachable, match="no gateway at"):
+                Robot(gone, ONCE)
 
 
 def test_no_socket_here_stands_for_another_computer(folder: Path) -> None:

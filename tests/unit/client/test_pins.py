@@ -9,9 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from gateway.client import Address, LinkLost, LinkSettings, NotPaired, Robot, Unreachable, WrongRobot
-from gateway.client.keys import keys_folder, pin_of, server_file
+from gateway.client import (
+    Address,
+    BadAddress,
+    LinkLost,
+    LinkSettings,
+    NotPaired,
+    Robot,
+    Unreachable,
+    WrongRobot,
+)
+from gateway.client.keys import keys_folder, named, pin_of, server_file
 from gateway.client.pairing import pin
+from gateway.main import main
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway.harness import Bench, config, serving
 from tests.unit.gateway.keyed import keyed
@@ -117,3 +127,52 @@ def test_to_another_computer_nothing_is_said_in_plain(
     with pytest.raises(NotPaired, match="nothing is said in plain"):
         pin_of(Address(host, 7420))
     assert [pin_of(Address(here, 7420)) for here in ("127.0.0.1", "localhost", "::1")] == [None] * 3
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The server's file of a user, to be written to."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    server_file().parent.mkdir()
+    return server_file()
+
+
+def test_two_robots_at_one_address_each_have_their_own_pin(file: Path) -> None:
+    """As behind one forwarded port, one today and another tomorrow: the first one's pin was asked of both."""
+    file.write_text(
+        "[robots]\n"
+        f'exo-1 = {{ address = "127.0.0.1:7420", pin = "{"a" * 64}" }}\n'
+        f'exo-2 = {{ address = "127.0.0.1:7420", pin = "{"B" * 64}" }}\n'
+        'exo-3 = { address = "192.0.2.7" }\n'
+        'exo-4 = "192.0.2.8:7421"\n'
+    )
+    found = {name: named(name) for name in ("exo-1", "exo-2", "exo-3", "exo-4", "exo-5")}
+    assert found["exo-1"] is not None
+    assert found["exo-2"] is not None
+    assert (pin_of(found["exo-1"]), pin_of(found["exo-2"])) == ("a" * 64, "b" * 64)
+    assert (found["exo-3"], found["exo-4"]) == (Address("192.0.2.7"), Address("192.0.2.8", 7421))
+    assert found["exo-5"] is None
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        (f'{{ address = "127.0.0.1:7420", pin = "{"a" * 63}" }}', "64 hexadecimal digits"),
+        ('{ address = "127.0.0.1:7420", pin = 7 }', "64 hexadecimal digits"),
+        ('{ address = "127.0.0.1:99999" }', "a port from 1 to 65535"),
+        ('"127.0.0.1:99999"', "a port from 1 to 65535"),
+        (f'{{ pin = "{"a" * 64}" }}', "an address is missing"),
+        ("7420", "an address is missing"),
+    ],
+)
+def test_a_robot_whose_entry_cannot_be_used_is_no_host_of_that_name(
+    file: Path, entry: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file.write_text(f"[robots]\nexo-1 = {entry}\n")
+    with pytest.raises(BadAddress, match=rf"exo-1 stands in .* of {file} and cannot be used: .*{why}"):
+        named("exo-1")
+    with pytest.raises(SystemExit):
+        main(["stop", "--robot", "exo-1"])
+    said = capsys.readouterr().err
+    assert f"argument --robot: exo-1 stands in [robots] of {file}" in said
+    assert "no gateway" not in said

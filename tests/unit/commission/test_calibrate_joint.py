@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import stat
 import tomllib
 from collections.abc import Callable
@@ -13,11 +14,13 @@ import pytest
 from drivers.errors import SettingsError
 from drivers.joint.settings import JointSettings
 from gateway.cli import calibrate
+from gateway.cli.line_input import Typed
 from gateway.commission.dialogue import run
 from gateway.commission.draft import DraftValue
 from gateway.commission.edit import NotEdited, comment_of, with_value
 from gateway.commission.zero import NotRepeated, posture, repeated
 from gateway.config.reading import load
+from gateway.main import main
 from tests.unit.commission.fake_bench import ON, FakeBench, FakeDrive, Hands
 from tests.unit.commission.homing_drive import HomingDrive, encoded
 
@@ -194,6 +197,25 @@ def test_what_was_changed_by_hand_meanwhile_is_not_written_over(
     text = robot.read_text(encoding="utf-8")
     assert "gear_ratio = 121" in text
     assert "zero_offset = 0.5\n" in text
+
+
+def test_a_stop_while_nothing_is_powered_is_said_to_have_stopped_nothing(
+    robot: Path,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    before = robot.read_text(encoding="utf-8")
+    source, sink = os.pipe()
+    os.write(sink, b"please stop\n")
+    os.close(sink)
+    monkeypatch.setattr("gateway.cli.commission_faces.Typed", lambda: Typed(source))
+    with HomingDrive(request.node.nodeid, 5) as drive:
+        assert main(["calibrate", "joint", f"{robot}:left_knee"]) == 130
+        assert drive.writes == []
+    os.close(source)
+    assert "has stopped nothing: gwrms stop does" in capsys.readouterr().err
+    assert robot.read_text(encoding="utf-8") == before
 
 
 def test_ends_of_lines_a_link_and_its_mode_stay(

@@ -11,8 +11,12 @@ from typing import Any
 
 import pytest
 
+from drivers.bus.settings import CanSettings
 from gateway.cli import commission_lines, joint_test
 from gateway.cli.motion_ends import ENDS
+from gateway.commission.bench import CanBench
+from gateway.commission.draft import Draft
+from gateway.commission.stopping import stop
 from gateway.main import main
 from tests.support.waiting import until
 from tests.unit.commission.homing_drive import HomingDrive
@@ -67,6 +71,24 @@ def test_a_question_that_waits_is_left_in_order(
     assert process.returncode == status, rest
     assert words in rest
     assert [one.name for one in tmp_path.iterdir()] == ["exo-01.toml.commission"]
+
+
+def test_a_stop_asks_the_drives_that_were_found_and_those_of_the_file_before(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """While a robot was commissioned anew, those of its file that were not found yet went on."""
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    draft.file.write_text("[joint.left_knee]\nnode_id = 6\n[joint.right_knee]\nnode_id = 5\n")
+    channel = request.node.nodeid
+    bench = CanBench("main", CanSettings(interface="virtual", channel=channel))
+    on = S.OPERATION_ENABLED
+    with HomingDrive(channel, 5, state=on) as found, HomingDrive(channel, 6, state=on) as kept:
+        try:
+            assert stop(bench, draft).drives == {"node 5": "confirmed", "node 6": "confirmed"}
+        finally:
+            bench.close()
+        assert (found.state, kept.state) == (S.SWITCH_ON_DISABLED, S.SWITCH_ON_DISABLED)
 
 
 def test_a_bus_that_is_not_there_is_said_before_anything_is_asked_and_leaves_no_file(

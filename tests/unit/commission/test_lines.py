@@ -132,6 +132,16 @@ def test_the_word_in_an_answer_is_no_stop(pipe: Pipe) -> None:
     assert said == ["stop", "stop watch", "non-stop", '{"stop": false}', "a/stop.toml"]
 
 
+@pytest.mark.parametrize(
+    "line", ["please stop", "stopp", '{"answer": "STOP it", "number": 1}', '{"stop": 0}']
+)
+def test_where_only_enter_is_asked_for_whatever_has_stop_in_it_is_one(pipe: Pipe, line: str) -> None:
+    with ending(), Lines(pipe.source) as lines:
+        with pytest.raises(MotionEnded):
+            stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("Press Enter.", press=True)), line)
+        assert lines.stop_asked
+
+
 def test_a_line_that_nothing_can_read_takes_no_hearing(pipe: Pipe) -> None:
     """Thousands of brackets ended the thread that reads: a stop after them was not heard any more."""
     pipe.write("[" * 20_000)

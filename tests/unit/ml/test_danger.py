@@ -1,6 +1,7 @@
 """Danger: unknown is never fine, evidence never speaks against danger, thresholds keep their budgets."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from ml.danger.false_alarm_budget import (
     thresholds,
 )
 from ml.danger.levels import CALM_S, HOLD, RELEASE, URGENT, Level, Levels, sustained
-from ml.danger.monitor import COMPARE, STRANGE_S, DangerMonitor, Evidence
+from ml.danger.monitor import COMPARE, HARM_S, STRANGE_S, DangerMonitor, Evidence
 from ml.danger.nearest_neighbours import NearestNeighbours
 from ml.danger.observation import CHANNELS
 
@@ -206,16 +207,14 @@ def test_what_is_like_nothing_before_is_compared_with_nothing_for_a_while(
     assert silent == [set(), set(COMPARE), set(COMPARE), set()]
 
 
-def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """It was called over: of that joint nobody knew anything any more."""
+def judged(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., list[Level]]]:
+    """Spreads of the detectors to be set, and the levels in the next seconds, each once, while `lost` is."""
     above = np.zeros(len(DETECTORS))
     monkeypatch.setattr(Evidence, "take", lambda _self, _at_s, _values: above.copy())
     monkeypatch.setattr(Evidence, "why", lambda _self, _above: ("the left knee lags",))
     watch, stamp_ns = DangerMonitor(CALIBRATION), 0
 
-    def levels(seconds: float, lost: str = "nothing") -> list[Level]:
+    def levels(seconds: float, lost: str | tuple[str, ...] = "nothing") -> list[Level]:
         nonlocal stamp_ns
         found = []
         for _ in range(int(seconds * 25)):
@@ -224,6 +223,51 @@ def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
             found.append(watch.take(stamp_ns, row))
         return list(dict.fromkeys(one.level for one in found if one is not None))
 
+    return above, levels
+
+
+def levelled(monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, Callable[..., list[Level]]]:
+    """Return the same, where the first detector's spread is the level that it just meets."""
+    odds = {Level.NONE: -50.0, **CALIBRATION.by_level}
+    monkeypatch.setattr(Calibration, "log_odds", lambda _self, above: odds[Level(int(above[0]))])
+    return judged(monkeypatch)
+
+
+def test_a_lower_level_by_what_is_still_seen_is_told_while_what_raised_a_higher_one_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A robot that was in danger still, by another joint, was of unknown danger."""
+    above, levels = levelled(monkeypatch)
+    above[0] = Level.STOP
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = Level.ALARM
+    assert levels(CALM_S + 2.0, "left_knee") == [Level.STOP, Level.ALARM]
+    above[0] = Level.EARLY
+    assert levels(CALM_S + 2.0, "left_knee")[-1] is Level.EARLY
+    above[0] = Level.NONE
+    assert levels(CALM_S + 2.0, "left_knee")[-1] is Level.UNKNOWN, "the stop may last, unseen"
+    assert levels(1.0) == [Level.NONE]
+
+
+def test_a_lower_level_does_not_end_either_because_the_joint_that_raised_it_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was over as soon as the higher one was too old to last, by a joint of which nothing is known."""
+    above, levels = levelled(monkeypatch)
+    above[0] = Level.STOP
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = Level.ALARM
+    assert levels(HARM_S - 1.0, "left_knee") == [Level.STOP, Level.ALARM]
+    above[0] = Level.NONE
+    assert Level.NONE not in levels(HARM_S - 1.0, ("left_knee", "right_knee"))
+    assert levels(2.0, ("left_knee", "right_knee"))[-1] is Level.NONE
+
+
+def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was called over: of that joint nobody knew anything any more."""
+    above, levels = judged(monkeypatch)
     above[0] = 50.0
     assert levels(1.0)[-1] is Level.STOP
     above[0] = math.nan
@@ -234,6 +278,7 @@ def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
     assert levels(1.0)[-1] is Level.STOP
     above[0] = 0.0
     assert levels(5.0) == [Level.STOP, Level.NONE]
+    assert levels(1.0, "left_knee") == [Level.NONE], "it was seen to be over"
     above[0] = 50.0
     assert levels(1.0)[-1] is Level.STOP
     above[0] = math.nan

@@ -6,6 +6,8 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -118,4 +120,19 @@ def test_no_thread_that_trains_gives_others_their_warnings_back_too_early() -> N
     assert warnings.filters[0][2] is ConvergenceWarning
     ended.set()
     other.join()
+    assert list(warnings.filters) == before
+
+
+def test_trainings_within_another_and_beyond_its_end_keep_warnings_suppressed_to_the_last() -> None:
+    """A generator of results may be begun by one thread and closed by another."""
+    before = list(warnings.filters)
+    outer, inner, last = ExitStack(), ExitStack(), ExitStack()
+    for one in (outer, inner, last):
+        one.enter_context(fixed_epochs())
+    inner.close()
+    assert warnings.filters[0][2] is ConvergenceWarning
+    outer.close()
+    assert warnings.filters[0][2] is ConvergenceWarning
+    with ThreadPoolExecutor(1) as other:
+        other.submit(last.close).result()
     assert list(warnings.filters) == before
