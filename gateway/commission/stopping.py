@@ -66,13 +66,16 @@ class Stopped:
 def stop(bench: CanBench, draft: Draft) -> Stopped:
     """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
 
-    Known are those that were found until now, and the joints of the robot's file.
+    Known are those that were found until now, and the joints of the robot's file. Of a draft in which
+    nothing is found yet, or that cannot be read, all node ids are asked, too.
 
     Raises:
         DriverError: the bus does not open.
 
     """
-    found = _stopped(bench, {*axes_of(draft), *_axes_in(draft.file)})
+    found_until_now = set(axes_of(draft))
+    known = found_until_now | set(_axes_in(draft.file))
+    found = _stopped(bench, known, every=not found_until_now and draft.path.exists())
     return Stopped({str(axis): outcome for axis, outcome in found.items()})
 
 
@@ -96,8 +99,9 @@ def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
     return Stopped(drives, "; ".join(problems))
 
 
-def _stopped(bench: CanBench, known: Collection[Axis]) -> dict[Axis, StopOutcome]:
-    for axis in sorted(known, key=_place) or map(Axis, EVERY_NODE):
+def _stopped(bench: CanBench, known: Collection[Axis], *, every: bool = False) -> dict[Axis, StopOutcome]:
+    asked = {*known, *(map(Axis, EVERY_NODE) if every or not known else ())}
+    for axis in sorted(asked, key=lambda one: (one not in known, _place(one))):
         bench.send_urgent(axis.node, _request(axis))
     found = _confirmed(bench, known)
     further = [axis for axis in _further(bench, found) if axis not in found]

@@ -30,13 +30,13 @@ class DangerWatch:
         self._robot = robot
         self._calibration = calibration
         self._rules = [PredictionRule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
-        self._told: DangerVerdict | None = None
         self.restart()
 
     def restart(self) -> None:
         """Begin anew: the robot has booted, or another one wears it."""
         self._watch = DangerMonitor(self._calibration)
         self.newest: DangerReport | None = None
+        self._told: DangerVerdict | None = None
 
     def take(self, batch: Batch, clock: Clock) -> Iterator[News]:
         """Take rows; what is to be told of them."""

@@ -276,6 +276,21 @@ def test_a_stop_after_the_file_is_written_asks_its_joints(
     assert capsys.readouterr().out.startswith("NOT CONFIRMED: node 2 is unreachable, node 5, axis 1 is")
 
 
+def test_a_stop_asks_every_node_where_the_draft_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drives of the draft that the robot's file of before does not have went on."""
+    monkeypatch.setattr("gateway.cli.motion_ends.signal.signal", lambda *_: None)
+    file = tmp_path / "exo-01.toml"
+    file.write_text("[joint.left_knee]\nnode_id = 2\n")
+    Path(f"{file}.commission").write_text("[[[ damaged")
+    with can.Bus(interface="virtual", channel="damaged") as other:
+        assert main(["--stop", str(file), "virtual:damaged"]) == 1
+        sent = [frame.arbitration_id for frame in iter(lambda: other.recv(0.5), None)]
+    assert sent[0] == 0x602, "what is known comes first"
+    assert {0x600 + node for node in range(1, 128)} <= set(sent)
+
+
 def test_the_rated_torque_that_is_shown_is_in_the_unit_of_its_maker(
     draft: Draft, bench: FakeBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

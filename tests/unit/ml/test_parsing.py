@@ -115,10 +115,12 @@ def test_no_thread_that_trains_gives_others_their_warnings_back_too_early() -> N
     before = list(warnings.filters)
     other = threading.Thread(target=trains)
     other.start()
-    with fixed_epochs():
-        within.wait()
-    assert warnings.filters[0][2] is ConvergenceWarning
-    ended.set()
+    try:
+        with fixed_epochs():
+            within.wait()
+        assert warnings.filters[0][2] is ConvergenceWarning
+    finally:
+        ended.set()
     other.join()
     assert list(warnings.filters) == before
 
