@@ -5,16 +5,20 @@ from collections.abc import Iterator
 
 import pytest
 from msgspec.structs import replace
+from PySide6.QtWidgets import QApplication
 
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.finding import FindingInfo
+from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.follow.events import BusesSeen, Described, Looked
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.refresh_rate import SLOW
+from server_gui.views.resources.bus_card import SENDER, controller_text
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
+from server_gui.views.resources.load_bar import LoadBar
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described, looked, walking
@@ -57,8 +61,10 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     show(view, bench, BUS)
     assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
     assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
-    assert row(view, 0) == ["2", "left knee", "90 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
-    assert row(view, 1)[:4] == ["no known node", "", "10 %", "100"]
+    knee = ["2", "left knee", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
+    assert row(view, 0) == knee, "nothing new comes from the robot"
+    assert row(view, 1)[:5] == ["–", "SYNC", "", "10 %", "100"]
+    assert row(view, 2)[:5] == ["–", "gateway or filtered", "", "1 %", "10"]
     assert not view.said.isVisible()
 
 
@@ -72,11 +78,11 @@ def test_how_often_it_was_opened_is_in_words(
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
-    assert view.said.text() == "ALARM: bus main: it is full: 100 % of its time is taken"
-    assert view.checks.text().startswith("→ find what sends so much")
+    assert view.said.text() == "bus fails: main: it is full: 100 % of its time is taken"
+    assert view.checks.text().startswith("→ 89 % of its frames are from left knee, the most: send fewer PDOs")
     assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"
-    assert view.cards[0]._icon.accessibleName() == "ALARM"
+    assert view.cards[0]._icon.accessibleName() == "bus fails"
     show(view, bench, BUS)
     assert not view.said.isVisible()
     assert not view.checks.isVisible()
@@ -103,8 +109,8 @@ def test_the_last_line_has_the_worst_bus(bar: StatusBar, bench: Bench) -> None:
     assert bar.computer.text() == "CPU – · memory –"
     bench.station.take([BusesSeen((replace(BUS, load_percent=100.0),), time.monotonic_ns())])
     bar.refresh()
-    assert bar.bus.text() == "CAN main 100 %, 4 errors: it is full · most: left knee 90 %"
-    assert bar._bus_icon.accessibleName() == "ALARM"
+    assert bar.bus.text() == "CAN main 100 %, 4 errors: it is full · 89 % of its frames are from left knee"
+    assert bar._bus_icon.accessibleName() == "bus fails"
 
 
 def test_no_bus_is_good_on_the_last_line_where_nothing_new_comes(bar: StatusBar, bench: Bench) -> None:
@@ -148,13 +154,65 @@ def test_page_and_last_line_give_one_fact_one_severity(
     show(view, bench, replace(BUS, nodes=[replace(NODE, pdos_missing_percent=4.4)]))
     show(view, bench, replace(BUS, findings=[errors], nodes=[NODE]))  # none is missing any more
     first, *others = view.said.text().splitlines()
-    assert first.startswith("ALARM: lost: left knee")
+    assert first.startswith("lost: left knee")
     assert others == [
-        "warning: bus main: 32 error frames in the last 10 s",
-        "warning: bus main: left knee: 4 % of its PDOs are missing",
+        "bus trouble: main: 32 error frames in the last 10 s; left knee: 4 % of its PDOs are missing"
     ]
+    assert {first, *others} == {alarm.line for alarm in bench.station.alarms.each}, "words of its own"
     assert row(view, 0)[-1] == "4.4 %", "the table says of a node what the line above says of it"
     assert view.cards[0]._bar._colour == "accent", "the load is as good as ever"
     bar.refresh()
-    assert bar._bus_icon.accessibleName() == "ALARM"
+    lost_mark = TEXTS[Kind.LOST].mark
+    assert bar._bus_icon.mark == view.cards[0]._icon.mark == lost_mark, "one state has one mark"
+    assert row(view, 0)[2] == "✕ lost"
     assert bar.bus.text() == "CAN main 41 %: lost left knee"
+
+
+def test_whose_state_it_is_stands_with_it(view: BusHealthView, bench: Bench) -> None:
+    """It is the gateway's own controller that is not bus off; of nodes nobody knows that."""
+    bench.station.take([walking(1)])
+    show(view, bench, BUS)
+    said = "gateway's CAN controller: error active (normal), never bus off, opened once"
+    assert said in view.cards[0]._counters.accessibleDescription()
+    off = replace(BUS, state="bus off", bus_offs=2, opened=3)
+    assert (
+        controller_text(off, live=True)
+        == "gateway's CAN controller: bus off, 2 times bus off, opened 3 times"
+    )
+    assert "error active" not in view.cards[0].note
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_columns_go_before_a_name_is_cut(
+    view: BusHealthView, bench: Bench, theme: Theme, scale: float
+) -> None:
+    """In the narrowest page hip and knee are still told apart."""
+    theme.set(scale=scale)
+    names = ("left_hip", "left_knee", "right_ankle")
+    nodes = [
+        replace(NODE, node_id=place, components=[name], pdos_missing_percent=1.5)
+        for place, name in enumerate(names, 1)
+    ]
+    talks = [*(TalkInfo("TPDO", node.node_id, 250.0) for node in nodes), TalkInfo("SYNC", None, 100.0)]
+    view.resize(470, 700)
+    QApplication.processEvents()
+    show(view, bench, replace(BUS, nodes=nodes, talks=talks))
+    QApplication.processEvents()
+    show(view, bench, replace(BUS, nodes=nodes, talks=talks))
+    table = view.cards[0].table
+    assert table.columnWidth(SENDER) >= table.sizeHintForColumn(SENDER)
+    assert table.columnWidth(SENDER) >= table.horizontalHeader().sectionSizeHint(SENDER)
+    shown = [column for column in range(table.columnCount()) if not table.isColumnHidden(column)]
+    assert sum(map(table.columnWidth, shown)) <= table.viewport().width()
+
+
+@pytest.mark.parametrize("width", [200, 600])
+def test_the_marks_of_the_load_are_named(theme: Theme, width: int) -> None:
+    bar = LoadBar(theme)
+    bar.resize(width, bar.sizeHint().height())
+    busy, full = bar.marks
+    assert "busy" in busy
+    assert "80 %" in busy
+    assert "full" in full
+    assert "95 %" in full
+    destroy(bar)

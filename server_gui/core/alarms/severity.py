@@ -46,6 +46,14 @@ def worsened_by(own: BusHealthLevel, bus: str, alarms: Alarms) -> Alarm | None:
     return min(of_nodes, key=lambda alarm: alarm.rank, default=None)
 
 
+def bus_mark(level: BusHealthLevel, bus: str, alarms: Alarms) -> Mark | None:
+    """Return the mark of the worst alarm about a bus or its nodes; None where none is as bad as the bus."""
+    colour = {BusHealthLevel.ALARM: "bad", BusHealthLevel.WARNING: "warn"}.get(level)
+    as_bad = (alarm for alarm in _on(bus, alarms) if alarm.mark.colour == colour)
+    worst = min(as_bad, key=lambda alarm: alarm.rank, default=None)
+    return None if worst is None else worst.mark
+
+
 def _on(bus: str, alarms: Alarms) -> list[Alarm]:
     """About a bus or its nodes."""
     return [alarm for alarm in alarms.each if bus in (alarm.node, alarm.subject.removeprefix("bus."))]

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
@@ -11,6 +10,7 @@ from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
 from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.missing_pdos import told_percent, told_words
 from server_gui.core.follow.robot import Robot
+from server_gui.core.processing.bus_senders import fewer, talking
 
 ACTIVE: Final = "error active"
 OFF: Final = "bus off"
@@ -18,7 +18,6 @@ FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
 TAKEN: Final = "of its time is taken"
 BUSY_PERCENT: Final = 80.0  # as the gateway finds it
 OLD_S: Final = 5.0  # what was seen before is not known now
-FEWER: Final = "find what sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
 FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
 GROWS: Final = re.compile(r", \d+ requests in a row")  # a count of one look, which the bus's page alone has
@@ -35,17 +34,6 @@ class BusHealthLevel(Enum):
 
 
 ORDER: Final = tuple(BusHealthLevel)
-
-
-@dataclass(frozen=True, slots=True)
-class Talking:
-    """One sender on a bus: its share of the frames that came, and what it sends, the most first."""
-
-    node_id: int | None
-    names: tuple[str, ...]
-    frames_per_s: float
-    share: float  # 0–1
-    kinds: tuple[tuple[str, float], ...]
 
 
 def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
@@ -97,7 +85,7 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
     if bus.load_percent is None and level(bus) is BusHealthLevel.UNKNOWN:
         return BusHealthLevel.UNKNOWN, (f"CAN {bus.name} –", "CAN –")
     most = next(iter(talking(bus)), None)
-    who = "" if most is None else f" · most: {_names(most)}"
+    who = "" if most is None else f" · {most.said}"
     if (why := reason(bus)) is not None:
         why = tuple(one.removesuffix(f": {load_text(bus)} {TAKEN}") for one in why)
         said = [f"{load}, {errors_text(bus)}: {why[0]}{who}", *(f"{load}: {one}" for one in why)]
@@ -126,7 +114,7 @@ def rated(bus: BusInfo) -> list[tuple[BusHealthLevel, str, str]]:
     own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago
     if len(own) < len(bus.findings) or load >= (FULL_PERCENT if own else BUSY_PERCENT):
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
-        full = [(f"{said}: {load_text(bus)} {TAKEN}", FEWER)]
+        full = [(f"{said}: {load_text(bus)} {TAKEN}", fewer(bus))]
     warning, alarm = BusHealthLevel.WARNING, BusHealthLevel.ALARM
     of_state, of_load = (
         alarm if bad else warning for bad in (bus.state in (CLOSED, OFF), load >= FULL_PERCENT)
@@ -160,33 +148,6 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
     }
     first = said[0].partition("; ")[0]
     return first, next((word for word, so in reversed(short.items()) if so), "a node is in trouble")
-
-
-def talking(bus: BusInfo) -> list[Talking]:
-    """Return the senders on a bus, the busiest first; `node_id` None stands for frames of no node."""
-    names = {node.node_id: tuple(node.components) for node in bus.nodes}
-    total = sum(one.frames_per_s for one in bus.talks)
-    by_node: dict[int | None, dict[str, float]] = {}
-    for one in bus.talks:
-        kinds = by_node.setdefault(one.node_id, {})
-        kinds[one.kind] = kinds.get(one.kind, 0.0) + one.frames_per_s
-    found = [
-        Talking(
-            node_id,
-            names.get(node_id, ()) if node_id is not None else (),
-            rate := sum(kinds.values()),
-            rate / total if total else 0.0,
-            tuple(sorted(kinds.items(), key=lambda item: -item[1])),
-        )
-        for node_id, kinds in by_node.items()
-    ]
-    return sorted(found, key=lambda one: -one.frames_per_s)
-
-
-def _names(one: Talking) -> str:
-    known = ", ".join(name.replace("_", " ") for name in one.names)
-    nameless = "frames of no known node" if one.node_id is None else f"node {one.node_id}"
-    return f"{known or nameless} {100 * one.share:.0f} %"
 
 
 def _joined(texts: Iterable[str]) -> str:

@@ -7,6 +7,7 @@ from typing import Final
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication, QStatusBar
 
+from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.severity import bus_level, worsened_by
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
@@ -14,7 +15,7 @@ from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, load_text, seen, worst
 from server_gui.views.frame.recording_chip import TONES
-from server_gui.views.resources.bus_health import LEVELS
+from server_gui.views.resources.bus_card import LEVELS, shown_mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
@@ -66,8 +67,8 @@ class StatusBar(QStatusBar):
         """Show how it is now."""
         station = self._desk.selected
         self.computer.say(*(("no robot", "") if station is None else _computer(station)))
-        level, words = (BusHealthLevel.UNKNOWN, ("",)) if station is None else _bus(station)
-        self._bus_icon.show_mark(LEVELS[level])
+        mark, words = (LEVELS[BusHealthLevel.UNKNOWN], ("",)) if station is None else _bus(station)
+        self._bus_icon.show_mark(mark)
         self._bus_icon.setVisible(station is not None)
         self.bus.say(*words)
         set_tip(self.bus, words[0])
@@ -93,12 +94,14 @@ class StatusBar(QStatusBar):
         return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
 
 
-def _bus(station: Station) -> tuple[BusHealthLevel, tuple[str, ...]]:
+def _bus(station: Station) -> tuple[Mark, tuple[str, ...]]:
     """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
     level, words = worst(station.robot)
+    marks = {}
     for bus in seen(station.robot) or ():
         cause = worsened_by(level, bus.name, station.alarms)
         level = max(level, bus_level(level, bus.name, station.alarms), key=ORDER.index)
+        marks[bus.name] = shown_mark(level, bus.name, station.alarms, live=station.is_live)
         if cause is not None:  # its mark is of this, not of what is less bad
             load = load_text(bus)
             words = tuple(
@@ -106,7 +109,10 @@ def _bus(station: Station) -> tuple[BusHealthLevel, tuple[str, ...]]:
                 for name, whom in ((f"{bus.name} ", f" {cause.spoken}"), ("", f" {cause.spoken}"), ("", ""))
             )
     is_known = level is not BusHealthLevel.GOOD or station.is_live
-    return (level, words) if is_known else (BusHealthLevel.UNKNOWN, (UNKNOWN, "CAN –"))
+    if not is_known:
+        return LEVELS[BusHealthLevel.UNKNOWN], (UNKNOWN, "CAN –")
+    told = (mark for mark in marks.values() if mark.colour == LEVELS[level].colour and mark != LEVELS[level])
+    return next(told, LEVELS[level]), words
 
 
 def _computer(station: Station) -> tuple[str, ...]:
@@ -118,5 +124,5 @@ def _computer(station: Station) -> tuple[str, ...]:
     cpu = "–" if seen.cpu.percent is None else f"{seen.cpu.percent:.0f} %"
     most = busiest(station)
     short = f"CPU {cpu} · memory {share}"
-    full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} %",)
+    full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} % of a core",)
     return *full, short, f"CPU {cpu}"
