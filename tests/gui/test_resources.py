@@ -18,7 +18,7 @@ from server_gui.core.desk.busiest import Busiest, busiest
 from server_gui.core.follow.events import Costs, LinkChanged, without_processes
 from server_gui.views.resources.computer import held_back
 from server_gui.views.resources.page import Resources
-from server_gui.views.resources.processes import CPU, MEMORY, NAME, PID
+from server_gui.views.resources.processes import COMMAND, CPU, MEMORY, NAME, PID, ProcessTable
 from server_gui.views.resources.trend import Trend
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Curve
@@ -254,3 +254,52 @@ def test_a_trend_without_rows_has_no_axis_that_would_measure_nothing(theme: Them
     assert trend.plot.accessibleDescription() == "cpu 4.0"
     trend.show_rows("another", np.zeros(0), [Curve("cpu", "accent")], [np.zeros(0)], live=True)
     assert trend.plot._is_blank
+
+
+LINES = (
+    "/usr/bin/python3 -m gateway.main sim --scenario walk",
+    "/usr/bin/python3 -m gateway.main sim --scenario stand",
+    "bash /dev/fd/3",
+    "bash /opt/robot/shots.sh 3",
+)
+CALLED = ["gateway.main sim 7", "gateway.main sim 8", "bash /dev/fd/3", "shots.sh 3"]
+
+
+def test_a_process_has_one_name_in_table_curves_and_the_last_line(view: Resources, bench: Bench) -> None:
+    names = ("python3", "python3", "bash", "bash")
+    uses = [
+        ProcessUse(7 + place, name, 90.0 - place, MIB, line)
+        for place, (name, line) in enumerate(zip(names, LINES, strict=True))
+    ]
+    bench.station.take([resources()])
+    assert show(view, bench, *uses) == CALLED
+    assert [curve.channel for curve in view.top.plot._curves] == CALLED
+    assert busiest(bench.station) == Busiest(CALLED[0], 90.0)
+    without = ProcessUse(8, "python3", 95.0, MIB)
+    bench.station.take([without_processes(resources([without]))])
+    assert busiest(bench.station) == Busiest(CALLED[1], 95.0), (
+        "a look without commands has no other name for it"
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_names_of_processes_are_whole_and_the_command_is_left_out_before_them(
+    theme: Theme, scale: float
+) -> None:
+    theme.set(scale=scale)
+    table = ProcessTable(theme)
+    uses = [ProcessUse(7 + place, "python3", 90.0, 530 * MIB, line) for place, line in enumerate(LINES)]
+    table.resize(theme.px(360), theme.px(300))
+    table.show()
+    table.take(uses)
+    QApplication.processEvents()
+    assert table.isColumnHidden(COMMAND)
+    assert table.columnWidth(NAME) >= table.sizeHintForColumn(NAME)
+    shown = [column for column in range(5) if not table.isColumnHidden(column)]
+    assert {NAME, CPU, MEMORY} <= set(shown)
+    assert sum(map(table.columnWidth, shown)) <= table.viewport().width()
+    table.resize(theme.px(700), theme.px(300))
+    QApplication.processEvents()
+    assert not table.isColumnHidden(COMMAND)
+    assert not table.isColumnHidden(PID)
+    destroy(table)

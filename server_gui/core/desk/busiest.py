@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 from typing import Final
 
+from msgspec import UNSET
+
+from gateway.wire.resource import ProcessUse
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.frame_time import now_ns
-from server_gui.core.processing.process_names import short_name
+from server_gui.core.processing.process_names import labels, short_name
 
 OLD_S: Final = 10.0  # a look before says nothing of now
 
@@ -25,4 +28,12 @@ def busiest(station: Station) -> Busiest | None:
     most, at_ns = station.most
     if most.cpu_percent is None or now_ns() - at_ns > OLD_S * 1e9:
         return None
-    return Busiest(short_name(most), most.cpu_percent)
+    return Busiest(_label(station, most), most.cpu_percent)
+
+
+def _label(station: Station, process: ProcessUse) -> str:
+    """Return what the table calls it, as far as that has come: a look without the table tells no command."""
+    table = None if station.processes is None else station.processes.processes
+    known = [] if table is None or table is UNSET else table
+    is_there = any((one.pid, one.name) == (process.pid, process.name) for one in known)
+    return labels(known)[process.pid] if is_there else short_name(process)

@@ -117,12 +117,12 @@ class Resources(QWidget):
         station = self._desk.selected
         if station is None or self._frame % SLOW != 1:
             return
-        self._refresh_trends(station)
         self._refresh_notes(station)
         seen = station.processes
         if seen is not None and seen is not self._taken and isinstance(seen.processes, list):
             self._taken = seen
-            self.table.processes.take(seen.processes)
+            self.table.take(seen.processes)
+        self._refresh_trends(station)
         age_s = _age_s(station.processes_at_ns)
         old = age_s is not None and age_s > OLD_S
         count = self.table.processes.rowCount()
@@ -140,7 +140,7 @@ class Resources(QWidget):
         if wanted is not None:
             wanted.show_processes(True)
         if wanted is not None and self._taken is not None:
-            self.table.processes.take([])
+            self.table.take([])
         self._watched, self._taken = wanted, None
 
     def _refresh_trends(self, station: Station) -> None:
@@ -156,8 +156,10 @@ class Resources(QWidget):
         top = seen.top(TOP)
         times, columns = seen.over_time(top)
         colours = ("accent", "good", *OTHERS[1:3])
-        labels = told_apart([(one.label, one.pid) for one in top])
-        named = [Curve(name, colour) for name, colour in zip(labels, colours, strict=False)]
+        called = told_apart([(one.label, one.pid) for one in top])
+        known = self.table.processes.labels  # as the table calls them
+        said = [known.get(one.pid, name) for one, name in zip(top, called, strict=True)]
+        named = [Curve(name, colour) for name, colour in zip(said, colours, strict=False)]
         self.top.show_rows(seen, times, named, columns, live=live)
 
     def _refresh_notes(self, station: Station) -> None:

@@ -1,22 +1,25 @@
 """The process table: sorts both ways on every column, keeps the selection and where one has scrolled to."""
 
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView
+from PySide6.QtWidgets import QAbstractItemView
 
 from gateway.plain_text import plain
 from gateway.wire.resource import ProcessUse
-from server_gui.core.processing.process_names import arguments_of, command_of
+from server_gui.core.processing.process_names import arguments_of, command_of, labels
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.columns import fit, prepare
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
 TITLES: Final = ("Name", "Command", "PID", "CPU %", "Memory MiB")
 NAME, COMMAND, PID, CPU, MEMORY = range(5)
 MIB: Final = 1 << 20
-ROOM: Final = {NAME: 460, PID: 370}  # wide at least, at text of 100 %, for these columns beside the command
+LEAST: Final = {COMMAND: 140, NAME: 150}  # wide, at text of 100 %, where there is room for less than all
+SPARE: Final = (COMMAND, PID)  # left out in this order; a name that two have holds its process id
 
 
 class ProcessModel(RowsModel[ProcessUse]):
@@ -25,14 +28,22 @@ class ProcessModel(RowsModel[ProcessUse]):
     def __init__(self, theme: Theme) -> None:
         super().__init__(TITLES, lambda process: (process.pid, process.name), (CPU, MEMORY))
         self._theme = theme
+        self.labels: dict[int, str] = {}
+
+    def take(self, rows: Iterable[ProcessUse]) -> None:
+        processes = list(rows)
+        before, self.labels = self.labels, labels(processes)
+        super().take(processes)
+        if any(before.get(pid, label) != label for pid, label in self.labels.items()):  # another has its name
+            self.dataChanged.emit(self.index(0, NAME), self.index(len(self.rows) - 1, NAME))
 
     def data(self, index: Index, role: int = 0) -> Any:
         process, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return plain(_text(process, column))
+                return plain(_text(process, column, self.labels))
             case _ if role == SORT_ROLE:
-                return _key(process, column)
+                return _key(process, column, self.labels)
             case Qt.ItemDataRole.ToolTipRole:
                 return tip(command_of(process))
             case Qt.ItemDataRole.TextAlignmentRole if column >= PID:
@@ -51,33 +62,32 @@ class ProcessTable(RowsTable):
         super().__init__(self.sorted, "Processes of the robot's computer", CPU)
         self._theme = theme
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        header = self.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-        header.setSectionResizeMode(COMMAND, QHeaderView.ResizeMode.Stretch)
-        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # how a command begins and ends tells it apart
+        prepare(self)
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    def take(self, processes: Iterable[ProcessUse]) -> None:
+        """Show these from now on."""
+        self.processes.take(processes)
+        self._make_room()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._make_room()
 
     def _make_room(self) -> None:
-        """Show the command if there is not room for all columns: it tells processes apart."""
-        for column, least in ROOM.items():
-            self.setColumnHidden(column, self.width() < self._theme.px(least))
+        """Leave out the command, then the process id, before a name is cut: it tells processes apart."""
+        fit(self, {column: self._theme.px(width) for column, width in LEAST.items()}, SPARE)
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
-        for column, width in ((NAME, 96), (PID, 62), (CPU, 68), (MEMORY, 104)):
-            self.setColumnWidth(column, self._theme.px(width))
         self._make_room()
 
 
-def _text(process: ProcessUse, column: int) -> str:
+def _text(process: ProcessUse, column: int, called: Mapping[int, str]) -> str:
     match column:
         case 0:
-            return process.name
+            return called.get(process.pid, process.name)
         case 1:
             return arguments_of(process)
         case 2:
@@ -88,10 +98,10 @@ def _text(process: ProcessUse, column: int) -> str:
             return f"{process.memory_bytes / MIB:.1f}"
 
 
-def _key(process: ProcessUse, column: int) -> str | float:
+def _key(process: ProcessUse, column: int, called: Mapping[int, str]) -> str | float:
     match column:
         case 0:
-            return process.name.lower()
+            return called.get(process.pid, process.name).lower()
         case 1:
             return arguments_of(process).lower()
         case 2:
