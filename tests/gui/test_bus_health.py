@@ -16,7 +16,7 @@ from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.refresh_rate import SLOW
-from server_gui.views.resources.bus_card import SENDER, controller_text
+from server_gui.views.resources.bus_card import FRAMES, SENDER, STATE, controller_text
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.resources.load_bar import LoadBar
 from server_gui.views.theme import Theme
@@ -73,7 +73,7 @@ def test_how_often_it_was_opened_is_in_words(
     view: BusHealthView, bench: Bench, opened: int, words: str
 ) -> None:
     show(view, bench, replace(BUS, opened=opened))
-    assert words in view.cards[0]._counters.accessibleDescription()
+    assert words in view.cards[0]._controller.accessibleDescription()
 
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
@@ -173,7 +173,7 @@ def test_whose_state_it_is_stands_with_it(view: BusHealthView, bench: Bench) -> 
     bench.station.take([walking(1)])
     show(view, bench, BUS)
     said = "gateway's CAN controller: error active (normal), never bus off, opened once"
-    assert said in view.cards[0]._counters.accessibleDescription()
+    assert view.cards[0]._controller.accessibleDescription() == said
     off = replace(BUS, state="bus off", bus_offs=2, opened=3)
     assert (
         controller_text(off, live=True)
@@ -190,7 +190,7 @@ def test_columns_go_before_a_name_is_cut(
     theme.set(scale=scale)
     names = ("left_hip", "left_knee", "right_ankle")
     nodes = [
-        replace(NODE, node_id=place, components=[name], pdos_missing_percent=1.5)
+        replace(NODE, node_id=place, components=[name], pdos_missing_percent=3.5)
         for place, name in enumerate(names, 1)
     ]
     talks = [*(TalkInfo("TPDO", node.node_id, 250.0) for node in nodes), TalkInfo("SYNC", None, 100.0)]
@@ -203,6 +203,8 @@ def test_columns_go_before_a_name_is_cut(
     assert table.columnWidth(SENDER) >= table.sizeHintForColumn(SENDER)
     assert table.columnWidth(SENDER) >= table.horizontalHeader().sectionSizeHint(SENDER)
     shown = [column for column in range(table.columnCount()) if not table.isColumnHidden(column)]
+    assert {STATE, FRAMES} <= set(shown)
+    assert row(view, 0)[STATE].startswith("▲")
     assert sum(map(table.columnWidth, shown)) <= table.viewport().width()
 
 

@@ -11,7 +11,7 @@ from server_gui.core.alarms.marks import NOT_KNOWN, STATES, Mark, age_text
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.follow.missing_pdos import told_percent
 from server_gui.core.follow.robot import FollowedComponent
-from server_gui.core.processing.bus_health import BusHealthLevel, level, node_level, trouble
+from server_gui.core.processing.bus_health import BusHealthLevel, findings, level, node_level, trouble
 from server_gui.core.processing.bus_senders import Talking, kinds, talking, total, whole_numbers
 
 UNKNOWN: Final = "–"
@@ -73,11 +73,11 @@ def rows(bus: BusInfo, parts: Mapping[str, FollowedComponent], alarms: Alarms, *
 
 
 def told_kinds(bus: BusInfo) -> list[str]:
-    """Return each kind of frames with its share of the traffic: `TPDO 1527/s (59 %)`."""
+    """Return each kind of frames, how many a second, and their share of all: `TPDO 1527 (59 %)`."""
     found, whole = kinds(bus), total(bus) or 0.0
     numbers = whole_numbers([rate for _, rate in found], whole)
     return [
-        f"{kind} {number}/s ({100 * rate / whole:.0f} %)"
+        f"{kind} {number} ({100 * rate / whole:.0f} %)"
         for (kind, rate), number in zip(found, numbers, strict=True)
         if whole
     ]
@@ -120,7 +120,7 @@ def checks(buses: Sequence[BusInfo], alarms: Alarms) -> list[str]:
     """Return what to check about those lines, each once."""
     about = _about(buses)
     found = [one.check for one in alarms.each if one.subject in about and not one.subject.startswith("bus.")]
-    found += [said[1] for bus in buses if (said := trouble(bus)) is not None]
+    found += [check for bus in buses for _, check in findings(bus)]
     return [*dict.fromkeys(filter(None, found))]
 
 

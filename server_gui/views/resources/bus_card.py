@@ -74,7 +74,9 @@ class BusCard(Card):
         self._theme = theme
         self._icon, self.load, self._bar = MarkIcon(theme, 13), ShrinkingLabel("title"), LoadBar(theme)
         self._counters = WrappingLegend("Counters of the bus")
+        self._controller = WrappingLegend("The gateway's CAN controller")
         self._kinds = WrappingLegend("Traffic by kind")
+        self._rows: list[Row] = []
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
         self.table.setAccessibleName("Senders on the bus")
@@ -93,7 +95,7 @@ class BusCard(Card):
         head.addWidget(self._icon)
         head.addWidget(self.load, 1)
         self.body.addLayout(head)
-        for part in (self._bar, self._counters, self._kinds, self.table):
+        for part in (self._bar, self._counters, self._controller, self._kinds, self.table):
             self.body.addWidget(part)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -115,12 +117,16 @@ class BusCard(Card):
         self._bar.show_load(bus.load_percent, _colour_of(bus.load_percent or 0.0) if live else "old")
         set_tone(self.load, "" if live else "old")
         self.set_title(f"Bus {bus.name}")
-        self._counters.say(self._counted(bus, live=live))
-        self._kinds.say([(css(self._theme, "dim"), "", one) for one in told_kinds(bus)])
+        self._counters.say(self._counted(bus))
+        self._controller.say([self._controlled(bus, live=live)])
+        told = told_kinds(bus)
+        dim = css(self._theme, "dim")
+        self._kinds.say(
+            [(dim, "", one) for one in (f"Frames/s by kind: {told[0]}", *told[1:])] if told else []
+        )
         self._show_senders(rows(bus, station.robot.parts, alarms, live=live))
 
-    def _counted(self, bus: BusInfo, *, live: bool) -> list[tuple[str, str, str]]:
-        """Return the counters of the bus, and those of the gateway's own controller by that name."""
+    def _counted(self, bus: BusInfo) -> list[tuple[str, str, str]]:
         text, wrong = css(self._theme, "text"), css(self._theme, "warn")
         frames = total(bus)
         parts = [(text, "", f"{'–' if frames is None else f'{frames:.0f}'} frames/s")]
@@ -130,9 +136,13 @@ class BusCard(Card):
         ):
             words = f"{count} {one if count == 1 else many}"
             parts.append((wrong if count else text, "▲" if count else "", words))
+        return parts
+
+    def _controlled(self, bus: BusInfo, *, live: bool) -> tuple[str, str, str]:
         is_well = bus.state == ACTIVE and not bus.bus_offs
-        colour = css(self._theme, "bad") if bus.state in (OFF, CLOSED) else text if is_well else wrong
-        return [*parts, (colour, "" if is_well else "▲", controller_text(bus, live=live))]
+        colour = "bad" if bus.state in (OFF, CLOSED) else "text" if is_well else "warn"
+        mark = "" if is_well else "■" if colour == "bad" else "▲"
+        return css(self._theme, colour), mark, controller_text(bus, live=live)
 
     def _show_senders(self, shown: list[Row]) -> None:
         if self.table.rowCount() != len(shown):
@@ -142,6 +152,7 @@ class BusCard(Card):
             self.table.setFixedHeight(
                 height * max(len(shown), 1) + self.table.horizontalHeader().sizeHint().height() + 4
             )
+        self._rows = shown
         for place, row in enumerate(shown):
             for column, said in enumerate(_texts(row)):
                 self._set(place, column, said, row.colour)
@@ -149,14 +160,26 @@ class BusCard(Card):
 
     def _fit(self) -> None:
         """Leave out parts without room as a whole: no number is cut, and no name while a part can go."""
+        self._say_states(brief=False)
+        shown = self._columns()
+        if FRAMES not in shown:  # a state's mark is enough: what it means stands above
+            self._say_states(brief=True)
+            shown = self._columns()
+        for column in range(len(TITLES)):
+            self.table.setColumnHidden(column, column not in shown)
+
+    def _columns(self) -> set[int]:
         titles = title_widths(self.table)
         widths = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
         shown = set(range(len(TITLES)))
         for column in SPARE:
             if sum(widths[known] for known in shown) > self.table.viewport().width():
                 shown.discard(column)
-        for column in range(len(TITLES)):
-            self.table.setColumnHidden(column, column not in shown)
+        return shown
+
+    def _say_states(self, *, brief: bool) -> None:
+        for place, row in enumerate(self._rows[: self.table.rowCount()]):
+            self._set(place, STATE, _state(row, brief=brief), row.colour)
 
     def _set(self, row: int, column: int, text: str, colour: str) -> None:
         item = self.table.item(row, column)
@@ -192,12 +215,18 @@ def _colour_of(load_percent: float) -> str:
     return "bad" if load_percent >= FULL_PERCENT else "warn" if load_percent >= BUSY_PERCENT else "accent"
 
 
+def _state(row: Row, *, brief: bool = False) -> str:
+    if row.mark is None:
+        return ""
+    glyph = GLYPHS[row.mark.shape]
+    return glyph if brief else f"{glyph} {row.mark.word}"
+
+
 def _texts(row: Row) -> tuple[str, ...]:
-    state = "" if row.mark is None else f"{GLYPHS[row.mark.shape]} {row.mark.word}"
     return (
         row.node,
         row.name,
-        state,
+        _state(row),
         row.share,
         row.frames,
         row.sends,

@@ -65,7 +65,7 @@ class LoadBar(QWidget):
         ):
             x = round(self._at(percent))
             painter.setPen(self._theme.colour("text"))
-            painter.drawLine(x, 0, x, high + GAP)
+            painter.drawLine(x, 0, x, high)
             painter.setPen(self._theme.colour("dim"))
             painter.drawText(QRectF(0, high, end, self.height() - high), right | bottom, words)
         painter.end()

@@ -77,8 +77,8 @@ class Resources(QWidget):
         self._theme = theme
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(8, 8, 8, 8)
-        self._layout.addLayout(self._grid, 4)
-        self._layout.addWidget(self._processes, 3)
+        self._layout.addLayout(self._grid, 1)
+        self._layout.addWidget(self._processes, 1)
         self._arrange(2)
         desk.on_select.append(lambda _station: self._watch())
 

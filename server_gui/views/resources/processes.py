@@ -19,7 +19,7 @@ TITLES: Final = ("Name", "Command", "PID", "CPU %", "Memory MiB")
 NAME, COMMAND, PID, CPU, MEMORY = range(5)
 MIB: Final = 1 << 20
 LEAST: Final = {COMMAND: 140, NAME: 150}  # wide, at text of 100 %, where there is room for less than all
-SPARE: Final = (COMMAND, PID)  # left out in this order; a name that two have holds its process id
+SPARE: Final = (COMMAND, PID, MEMORY)  # left out in this order; a name that two have holds its process id
 
 
 class ProcessModel(RowsModel[ProcessUse]):

@@ -65,4 +65,5 @@ class WrappingLegend(WrappingHeight):
             short = f"{glyph} {metrics.elidedText(name, MIDDLE, room)} {number}"
             return rich(short.replace("-", HYPHEN)).replace(" ", "&nbsp;")  # no line ends within it
         words = (metrics.elidedText(word, MIDDLE, room) for word in text.split())
-        return f"{rich(glyph)}&nbsp;{rich(' '.join(words))}"
+        before = f"{rich(glyph)}&nbsp;" if glyph else ""
+        return f"{before}{rich(' '.join(words))}"
