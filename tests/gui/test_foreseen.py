@@ -172,16 +172,16 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
 
 
 @pytest.mark.parametrize(
-    ("states", "held", "why"),
+    ("states", "held", "why", "word"),
     [
-        ({}, True, "a stop is held"),
-        (dict.fromkeys(JOINTS, 5.0), False, "drives stop"),
-        (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled"),
-        ({"left_knee": 7.0}, False, "a drive is in fault"),
+        ({}, True, "a stop is held", "Stopped"),
+        (dict.fromkeys(JOINTS, 5.0), False, "drives stop", "Stopping"),
+        (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled", "Drives off"),
+        ({"left_knee": 7.0}, False, "a drive is in fault", "In fault"),
     ],
 )
 def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
-    window: Parts, station: Station, states: dict[str, float], held: bool, why: str
+    window: Parts, station: Station, states: dict[str, float], held: bool, why: str, word: str
 ) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
@@ -195,7 +195,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     assert (line.text, line.mark.colour, line.detail) == ("Not judged", "dim", why)
     window.overview.refresh()
     ring = window.overview._ring
-    assert (ring._word, ring._below) == ("Stopped", "not judged")
+    assert (ring._word, ring._below) == (word, "not judged")
     assert not any((*ring._phases.values(), *ring._modelled.values())), "a share of a stride is shown"
     station.take_prediction(predicted("steady", {"steady": 1.0, "fall": 0.0}, "falling"))
     station.take_prediction(predicted("stride", {"stride": 1.0}, "gait_phase"))
