@@ -178,10 +178,16 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
         (dict.fromkeys(JOINTS, 5.0), False, "drives stop", "Stopping"),
         (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled", "Drives off"),
         ({"left_knee": 7.0}, False, "a drive is in fault", "In fault"),
+        (
+            dict.fromkeys(JOINTS, 6.0) | {"left_knee": None},
+            False,
+            "a drive is not known, and no other is enabled",
+            "Not judged",
+        ),
     ],
 )
 def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
-    window: Parts, station: Station, states: dict[str, float], held: bool, why: str, word: str
+    window: Parts, station: Station, states: dict[str, float | None], held: bool, why: str, word: str
 ) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
