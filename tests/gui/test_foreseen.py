@@ -5,6 +5,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 
+import msgspec
 import pytest
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
@@ -17,7 +18,7 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.core.prediction.newest_predictions import OFF, NewestPrediction, Recalled
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
-from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
 from server_gui.views.overview.page import Overview
@@ -329,3 +330,19 @@ def test_without_an_insole_its_leg_has_no_phase_and_the_stride_is_not_judged(sta
     assert model_phases(station) == dict.fromkeys(Leg)
     line = next(one for one in lines(station) if one.text.startswith("Stride"))
     assert (line.text, line.detail) == ("Stride: not judged", "nothing comes from left insole")
+
+
+def test_of_a_lost_insole_it_is_said_by_what_its_leg_s_steps_are_seen(
+    station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its phase stood in the ring as if nothing had happened."""
+    one = looked(state="lost", problem="it went away")
+    quality = {"left_insole": one.quality.quality["left_knee"]}
+    station.take([dataclasses.replace(one, quality=msgspec.structs.replace(one.quality, quality=quality))])
+    derived = station.processing.derived()
+    by = {Leg.LEFT: EventSource.KINEMATICS, Leg.RIGHT: EventSource.PRESSURE}
+    shown = dataclasses.replace(derived, sources=by)
+    monkeypatch.setattr(station.processing, "derived", lambda: shown)
+    (line,) = (row for row in lines(station) if row.text.startswith("left insole"))
+    assert line.detail == "it went away · steps by its joints"
+    assert "left insole: lost · steps by its joints" in line.wordings

@@ -6,6 +6,7 @@ from typing import Final
 
 from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.overload import ALSO
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
@@ -101,7 +102,7 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts for less and less room: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    bare = [ASIDE.sub("", one) for one in check]
+    bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
     first = [f"{begins}{MORE}" for one in check if (begins := one.partition("; ")[0]) != one]
     with_check = (
         said,
