@@ -9,6 +9,7 @@ from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import TrustLevel
+from server_gui.core.alarms.robot_alarms import HELD, IN_FAULT, NONE_ENABLED, STOPPING
 from server_gui.core.desk.confidence import Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
@@ -31,6 +32,16 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationSta
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
+STEPS_BY: Final = {
+    EventSource.KINEMATICS: "steps by its joints",
+    EventSource.FOOT_IMU: "steps by its foot's IMU",
+}
+UNDRIVEN: Final = {  # what of such a robot is said where there is little room, by why it is not judged
+    HELD: "Stopped",
+    STOPPING: "Stopping",
+    IN_FAULT: "In fault",
+    NONE_ENABLED: "Drives off",
+}
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
 WALK: Final = "walk"  # a label of the models
@@ -53,7 +64,7 @@ class PredictionRow:
     @property
     def short_text(self) -> str:
         """Without what is said elsewhere."""
-        return "Stopped" if self.mark.word == STOPPED else self.text
+        return UNDRIVEN.get(self.detail, self.text)
 
     @property
     def wordings(self) -> tuple[str, ...]:
@@ -179,9 +190,18 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         why = part.problem or "no reason known"
         name = part.name.replace("_", " ")
         mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
-        yield PredictionRow(mark, f"{name}: {mark.word}", why, "", why)
+        by = _steps_by(station, part.name)
+        yield PredictionRow(mark, f"{name}: {mark.word}", " · ".join(filter(None, (why, by))), by, why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
         yield _learning(adapting)
+
+
+def _steps_by(station: Station, part: str) -> str:
+    """Return what a leg's steps are detected by while its insole is silent; empty of other parts."""
+    side, _, kind = part.partition("_")
+    leg = next((leg for leg in Leg if leg.value == side and kind == "insole"), None)
+    source = None if leg is None else station.processing.derived().sources.get(leg)
+    return "" if source is None else STEPS_BY.get(source, "")
 
 
 def _learning(adapting: Adapting) -> PredictionRow:

@@ -121,6 +121,9 @@ QStatusBar {{ border-top: 1px solid {border}; }}
 QStatusBar QLabel {{ color: {dim}; padding: 0 6px; }}
 QStatusBar::item {{ border: none; }}
 QDockWidget {{ font-weight: bold; }}
+QWidget#dockTitle {{ background: {card}; border-bottom: 1px solid {border}; }}
+QWidget#dockTitle QToolButton {{ border: none; background: transparent; padding: 1px; }}
+QWidget#dockTitle QToolButton:hover, QWidget#dockTitle QToolButton:focus {{ background: {field}; }}
 QDockWidget::title {{ background: {card}; padding: 6px 8px; border-bottom: 1px solid {border}; }}
 QFrame#card {{ background: {card}; border: 1px solid {border}; border-radius: 6px; }}
 QFrame#card[selected="true"] {{ border: 1px solid {accent}; border-left: 3px solid {accent}; }}

@@ -5,6 +5,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 
+import msgspec
 import pytest
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
@@ -17,7 +18,7 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.core.prediction.newest_predictions import OFF, NewestPrediction, Recalled
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
-from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
 from server_gui.views.overview.page import Overview
@@ -172,16 +173,22 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
 
 
 @pytest.mark.parametrize(
-    ("states", "held", "why"),
+    ("states", "held", "why", "word"),
     [
-        ({}, True, "a stop is held"),
-        (dict.fromkeys(JOINTS, 5.0), False, "drives stop"),
-        (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled"),
-        ({"left_knee": 7.0}, False, "a drive is in fault"),
+        ({}, True, "a stop is held", "Stopped"),
+        (dict.fromkeys(JOINTS, 5.0), False, "drives stop", "Stopping"),
+        (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled", "Drives off"),
+        ({"left_knee": 7.0}, False, "a drive is in fault", "In fault"),
+        (
+            dict.fromkeys(JOINTS, 6.0) | {"left_knee": None},
+            False,
+            "a drive is not known, and no other is enabled",
+            "Not judged",
+        ),
     ],
 )
 def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
-    window: Parts, station: Station, states: dict[str, float], held: bool, why: str
+    window: Parts, station: Station, states: dict[str, float | None], held: bool, why: str, word: str
 ) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
@@ -195,7 +202,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     assert (line.text, line.mark.colour, line.detail) == ("Not judged", "dim", why)
     window.overview.refresh()
     ring = window.overview._ring
-    assert (ring._word, ring._below) == ("Stopped", "not judged")
+    assert (ring._word, ring._below) == (word, "not judged")
     assert not any((*ring._phases.values(), *ring._modelled.values())), "a share of a stride is shown"
     station.take_prediction(predicted("steady", {"steady": 1.0, "fall": 0.0}, "falling"))
     station.take_prediction(predicted("stride", {"stride": 1.0}, "gait_phase"))
@@ -323,3 +330,19 @@ def test_without_an_insole_its_leg_has_no_phase_and_the_stride_is_not_judged(sta
     assert model_phases(station) == dict.fromkeys(Leg)
     line = next(one for one in lines(station) if one.text.startswith("Stride"))
     assert (line.text, line.detail) == ("Stride: not judged", "nothing comes from left insole")
+
+
+def test_of_a_lost_insole_it_is_said_by_what_its_leg_s_steps_are_seen(
+    station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its phase stood in the ring as if nothing had happened."""
+    one = looked(state="lost", problem="it went away")
+    quality = {"left_insole": one.quality.quality["left_knee"]}
+    station.take([dataclasses.replace(one, quality=msgspec.structs.replace(one.quality, quality=quality))])
+    derived = station.processing.derived()
+    by = {Leg.LEFT: EventSource.KINEMATICS, Leg.RIGHT: EventSource.PRESSURE}
+    shown = dataclasses.replace(derived, sources=by)
+    monkeypatch.setattr(station.processing, "derived", lambda: shown)
+    (line,) = (row for row in lines(station) if row.text.startswith("left insole"))
+    assert line.detail == "it went away · steps by its joints"
+    assert "left insole: lost · steps by its joints" in line.wordings

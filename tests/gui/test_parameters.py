@@ -386,4 +386,6 @@ def test_what_came_of_a_write_is_green_while_it_is_news(
     writing.say(WriteState.DONE, "taken back")
     assert _banner(bench.station, 0, "") == ("taken back", "good")
     monkeypatch.setattr(writing, "said_s", writing.said_s - NEWS_S)
-    assert _banner(bench.station, 0, "") == ("taken back", "plain")
+    said, tone = _banner(bench.station, 0, "")
+    assert re.fullmatch(r"\d\d:\d\d:\d\d  taken back", said)
+    assert tone == "plain"

@@ -10,6 +10,7 @@ from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 
 ASIDE: Final = re.compile(r" \([^()]*\)$")
+GRAVER: Final = {Kind.PART_STALE: "component silent", Kind.STALLED: "computer halted"}
 MORE: Final = " …"  # there is more, which stands in the list
 SHORT: Final = 100  # letters that have room on a card
 
@@ -43,11 +44,12 @@ class Alarm:
 
     @property
     def mark(self) -> Mark:
-        """How it is shown, wherever that is: in its own word, as bad as the worst that it explains."""
+        """How it is shown, wherever that is: as bad as the worst that it explains, and one word for each."""
         own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
         shown = TEXTS[worst.kind].mark
-        # As bad by itself: then in its own shape, so that one word has one mark.
-        return own if shown.colour == own.colour else Mark(shown.shape, shown.colour, own.word)
+        if shown.colour == own.colour:
+            return own
+        return Mark(shown.shape, shown.colour, GRAVER.get(self.kind, own.word))
 
     @property
     def rank(self) -> int:

@@ -11,7 +11,8 @@ from server_gui.core.follow.robot import Robot
 
 OURS: Final = "this computer is overloaded, end other programs on it first"
 THEIRS: Final = "the robot's computer is overloaded, see what keeps it busy first (gwrms blame)"
-UNPLUGGED: Final = "does not exist"  # as drivers say of a port
+UNPLUGGED: Final = ("does not exist", "went away")  # as drivers say of a port
+ALSO: Final = "; also "  # begins what is to be checked besides
 PARTS: Final = frozenset({Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
 SILENT: Final = frozenset({Kind.NO_LINK, Kind.STALE}) | PARTS
 
@@ -34,10 +35,10 @@ def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> I
     found = list(alarms)
     is_common = 2 * sum(one.kind in PARTS for one in found) >= parts
     for one in found:
-        if not first or one.kind not in SILENT or UNPLUGGED in one.what:
+        if not first or one.kind not in SILENT or any(word in one.what for word in UNPLUGGED):
             yield one
         elif one.kind in PARTS and not is_common:
             also = (text.replace(" first", "") for text in first)
-            yield dataclasses.replace(one, check="; also ".join(filter(None, (one.check, *also))))
+            yield dataclasses.replace(one, check=ALSO.join(filter(None, (one.check, *also))))
         else:
             yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, one.check))))

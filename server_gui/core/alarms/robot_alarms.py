@@ -23,6 +23,11 @@ from server_gui.core.tuning.stop import StopProgress, StopState
 EVERY_OFF: Final = "every drive is off"
 STILL_MOVING: Final = "still moving: STOP again"
 OFF: Final = frozenset({"switch on disabled"})
+# Why a robot does not drive its wearer.
+HELD: Final = "a stop is held"
+STOPPING: Final = "drives stop"
+IN_FAULT: Final = "a drive is in fault"
+NONE_ENABLED: Final = "no drive is enabled"
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
@@ -388,12 +393,14 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
     words = [(word or "").lower() for word in _words(robot).values()]
     if stopping.held:
-        return "a stop is held"
+        return HELD
     if _QUICK_STOP in words:
-        return "drives stop"
+        return STOPPING
     if any(word in _IN_FAULT for word in words):
-        return "a drive is in fault"
-    return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
+        return IN_FAULT
+    if ENABLED in words or not any(words):
+        return ""
+    return NONE_ENABLED if all(words) else "a drive is not known, and no other is enabled"
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:

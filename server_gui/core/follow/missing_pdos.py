@@ -24,6 +24,7 @@ KEPT_NS: Final = 20_000_000_000  # of looks that are judged, and at least
 KEPT_LOOKS: Final = 16  # so many, however far apart they are
 CHECK: Final = "see what keeps the robot's computer busy (gwrms blame), or take load from it"
 BUSY_PERCENT: Final = 90.0  # of the computer's cores
+NEARLY_ALL: Final = 0.75  # of the nodes
 
 
 class WatchedNode(NodeInfo, frozen=True):
@@ -102,6 +103,7 @@ class MissingPdos:
     def __init__(self) -> None:
         self._nodes: dict[tuple[str, int], NodeHistory] = {}
         self._looked_ns: int | None = None
+        self._busy_ns: int | None = None  # when the computer was so last
 
     def take(
         self, buses: Sequence[BusInfo], now_ns: int, cpu_percent: float | None = None
@@ -115,7 +117,10 @@ class MissingPdos:
         keys = [(bus.name, node.node_id) for bus in buses for node in bus.nodes]
         self._nodes = {key: known.get(key) or NodeHistory() for key in keys}
         self._looked_ns = now_ns
-        return tuple(self._bus(bus, now_ns, (cpu_percent or 0.0) >= BUSY_PERCENT) for bus in buses)
+        if (cpu_percent or 0.0) >= BUSY_PERCENT:
+            self._busy_ns = now_ns
+        is_busy = self._busy_ns is not None and now_ns - self._busy_ns <= KEPT_NS
+        return tuple(self._bus(bus, now_ns, is_busy) for bus in buses)
 
     def _bus(self, bus: BusInfo, now_ns: int, is_busy: bool) -> BusInfo:
         known = [(self._nodes[bus.name, node.node_id], _percent(node)) for node in bus.nodes]
@@ -123,7 +128,8 @@ class MissingPdos:
         if any(told):  # it is the bus's trouble: nobody is told that others with as many are fine
             told = [one or history.join(share) for one, (history, share) in zip(told, known, strict=True)]
         counted = [one for one, (_, share) in zip(told, known, strict=True) if one or share is not None]
-        is_busy = is_busy and len(counted) > 1 and all(counted)  # one alone has a cable of its own
+        missing = sum(map(bool, counted))  # at one alone, which has a cable of its own, or at nearly all
+        is_busy = is_busy and missing > 1 and missing >= NEARLY_ALL * len(counted)
         nodes = [
             node
             if (percent, is_busy) == (told_percent(node), False)

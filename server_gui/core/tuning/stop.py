@@ -90,8 +90,18 @@ class StopProgress:
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
+    _earlier: "tuple[Any, ...] | None" = None  # of a STOP that was confirmed and held when this one was sent
     _entry: int = 0  # of the journal: the newest that was read
     _is_written: bool = True  # whether the latest STOP was read in the journal: resets before are older
+
+    @property
+    def _proven(self) -> tuple[Any, ...]:
+        """When a STOP was sent, and what has proven it."""
+        return self.at_ns, self.since_s, self.answered_ms, self.proofs, self._off, self._confirmed
+
+    @_proven.setter
+    def _proven(self, proven: tuple[Any, ...]) -> None:
+        self.at_ns, self.since_s, self.answered_ms, self.proofs, self._off, self._confirmed = proven
 
     @property
     def stage(self) -> tuple[StopState, bool]:
@@ -106,6 +116,8 @@ class StopProgress:
     def sent(self, off: Collection[str] = (), at_ns: int | None = None) -> int:
         """Note that a STOP has gone out, and return its number; `off` drives are seen not to be enabled."""
         self.number += 1
+        is_again = self.held and self.state is StopState.CONFIRMED
+        self._earlier = self._proven if is_again else None
         now_ns = time.monotonic_ns()
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", now_ns if at_ns is None else at_ns
         self.why, self.answered_ms, self.was_ended = "", None, False
@@ -128,6 +140,8 @@ class StopProgress:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
+            if self._earlier is not None and set(self._earlier[-1]) == set(self._confirmed):
+                self._proven = self._earlier  # the robot was stopped by that one, and since then
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def failed(self, number: int, reason: str) -> None:

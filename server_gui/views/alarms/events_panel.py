@@ -184,15 +184,16 @@ class EventsPanel(QWidget):
         header.setSectionResizeMode(COLUMNS - 1, QHeaderView.ResizeMode.Stretch)
         header.setResizeContentsPrecision(0)  # as wide as what is in sight, not all there is
         self.table.activated.connect(self._activated)
-        tools = QHBoxLayout()
+        self.tools = QWidget()
+        tools = QHBoxLayout(self.tools)
         tools.setContentsMargins(4, 3, 4, 2)
         tools.addWidget(self.words, 1)
         tools.addWidget(self.kinds)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(tools)
-        column.addWidget(self.table, 1)
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(0)
+        self._column.addWidget(self.table, 1)
+        self.hold_tools()
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -210,6 +211,10 @@ class EventsPanel(QWidget):
         """Take what is new."""
         self._news.refresh()
         self.table.setColumnHidden(ROBOT, self._news.only is not None)
+
+    def hold_tools(self) -> None:
+        """Have the filter above the events: where no title bar has it."""
+        self._column.insertWidget(0, self.tools)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(self._theme.px(120), self._theme.px(60))

@@ -13,6 +13,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
 from server_gui.views.alarms.words import (
     REMEDY,
+    SINCE,
     Told,
     details,
     fewer,
@@ -144,7 +145,7 @@ class AlarmStrip(ClickableFrame):
             self.list.turn()
 
     def _active(self) -> list[Told]:
-        """Of all robots and the recording; of the one that is looked at first, where they are as bad.
+        """Of all robots and the recording: what is bad, then of the one that is looked at.
 
         How to go on after a reset is what its user looks for next: only what is bad goes before.
         """
@@ -154,8 +155,8 @@ class AlarmStrip(ClickableFrame):
             key=lambda told: (
                 told[1].is_acknowledged,
                 told[1].alarm.kind is not Kind.NOT_STOPPED,
-                told[0] is not None and told[0] is not selected,
                 told[1].alarm.mark.colour != "bad",
+                told[0] is not None and told[0] is not selected,
                 told[1].alarm.kind is not Kind.RESET,
                 told[1].alarm.rank,
                 told[1].since_s,
@@ -200,20 +201,12 @@ class AlarmStrip(ClickableFrame):
             box = QRect(0, 0, max(room.width(), 1), 100_000)
             return label.fontMetrics().boundingRect(box, WRAPPED, text).height() if text else 0
 
-        line = self.details.fontMetrics().lineSpacing()  # that since when, and what to check, have room too
         sizes = {text: high(self.headline, text) for text in wordings}
         rests = {text: high(self.details, text) for text in fuller}
-        told = [
+        fits = [
             (main, rest) for main in wordings for rest in fuller if sizes[main] + rests[rest] <= room.height()
         ]
-        fits = [
-            text for most in (room.height() - line, room.height()) for text in wordings if sizes[text] <= most
-        ]
-        main = next(iter(fits), wordings[-1])
-        rest = next((rest for one, rest in told if one == main), "")
-        checked = [pair for pair in told if REMEDY in pair[1]]  # what to check goes before what is longer
-        whole = (pair for pair in checked if MORE not in " ".join(pair))
-        main, rest = next(whole, next(iter(checked), (main, rest)))
+        main, rest = min(fits, key=_lacks, default=(wordings[-1], ""))
         set_text(self.headline, main)
         set_text(self.details, rest)
         self.details.setVisible(bool(rest))
@@ -235,6 +228,13 @@ class AlarmStrip(ClickableFrame):
         if self.height() != high or self.minimumHeight() != high:
             self.setFixedHeight(high)
         self._said = None
+
+
+def _lacks(said: tuple[str, str]) -> tuple[bool, ...]:
+    """Return what cause and details lack, the worst first; of several that lack as much the fullest comes."""
+    main, rest = said
+    has_remedy, is_timed = REMEDY in rest, rest.startswith(SINCE)
+    return not has_remedy, MORE in rest, has_remedy and not is_timed, not rest, MORE in main
 
 
 class _Words(QScrollArea):

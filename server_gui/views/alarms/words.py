@@ -6,6 +6,7 @@ from typing import Final
 
 from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.overload import ALSO
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
@@ -15,6 +16,7 @@ from server_gui.views.marks import Mark, time_of_day
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
+SINCE: Final = "since "
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -90,7 +92,7 @@ def now_s(station: Station | None) -> float:
 def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
     alarm = one.alarm
-    first = f"since {time_of_day(one.since_s)}, for {lasting(max(0.0, now_s - one.since_s))}"
+    first = f"{SINCE}{time_of_day(one.since_s)}, for {lasting(max(0.0, now_s - one.since_s))}"
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
@@ -98,17 +100,16 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 
 
 def fewer(said: list[str]) -> tuple[str, ...]:
-    """Return the details as texts of decreasing length: what to check stays longest, then the time."""
+    """Return the details as texts for less and less room: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    bare = [ASIDE.sub("", one) for one in check]
+    bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
     first = [f"{begins}{MORE}" for one in check if (begins := one.partition("; ")[0]) != one]
     with_check = (
         said,
         [since, *said[1:]],
-        said[1:],
         [since, *check],
-        check,
         [since, *bare],
+        check,
         bare,
         [since, *first] if first else [],
     )

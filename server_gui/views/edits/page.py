@@ -88,9 +88,9 @@ class Edits(QWidget):
         right = QVBoxLayout()
         right.addWidget(self.verdict)
         right.addWidget(self.words)
+        right.addWidget(self._legend)  # before what it explains, which may have to be scrolled to
         right.addLayout(self._grid, 1)
         right.addWidget(self.response, 1)
-        right.addWidget(self._legend)
         right.addStretch()
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._row.addLayout(self._left())

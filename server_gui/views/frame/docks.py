@@ -6,6 +6,7 @@ from typing import Final
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QTabWidget, QWidget
 
+from server_gui.views.frame.dock_title import DockTitle, HasTools
 from server_gui.views.theme import Theme
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
@@ -45,6 +46,7 @@ class Docks(QObject):
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
         window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        self._panels: dict[QDockWidget, QWidget] = {}
         self.all = [self._dock(title, widget, area) for title, (widget, area) in panels.items()]
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
@@ -124,6 +126,8 @@ class Docks(QObject):
         room = _room()
         dock.setWidget(room)
         room.setWidget(widget)
+        self._panels[dock] = widget
+        self._give_title(dock)
         dock.installEventFilter(self)
         return dock
 
@@ -160,7 +164,7 @@ class Docks(QObject):
         first = self.all[0]
         for dock in self.all:
             if not dock.isFloating():
-                dock.setTitleBarWidget(QWidget())
+                self._give_title(dock, QWidget())
                 self._window.addDockWidget(Area.RightDockWidgetArea, dock)
                 if dock is not first:
                     self._window.tabifyDockWidget(first, dock)
@@ -169,11 +173,18 @@ class Docks(QObject):
 
     def _unstack(self) -> None:
         for dock in self.all:
-            bar = dock.titleBarWidget()
-            dock.setTitleBarWidget(None)  # type: ignore[arg-type]
-            if bar is not None:
-                bar.deleteLater()
+            self._give_title(dock)
         self.restore(self._roomy)
+
+    def _give_title(self, dock: QDockWidget, bar: QWidget | None = None) -> None:
+        """Give it this title bar; by default the usual one, with the tools of its panel where it has some."""
+        panel, before = self._panels[dock], dock.titleBarWidget()
+        if isinstance(panel, HasTools):
+            panel.hold_tools()
+            bar = bar or DockTitle(dock, panel)
+        dock.setTitleBarWidget(bar)  # type: ignore[arg-type]
+        if before is not None:
+            before.deleteLater()
 
 
 def _room() -> QScrollArea:

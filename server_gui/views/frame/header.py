@@ -31,6 +31,7 @@ RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is
 # Brief, and then left out, in this order where there is less room; alarms stand below the header.
 BRIEF: Final = ("recording", "link", "drives")
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
+SPARE_AFTER_STOP: Final = ("status", "recording", "drives", "link", "robot")  # its result tells of the drives
 LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
 
@@ -148,7 +149,7 @@ class Header(QWidget):
                 needs[name] = chips[name].needs(brief=True)
         if "robot" in needs and not has_room():
             needs["robot"] = min(needs["robot"], max(chips["robot"].least, self._theme.px(LEAST_NAME)))
-        for name in SPARE:
+        for name in SPARE_AFTER_STOP if self._has_outcome else SPARE:
             if name in needs and not has_room():
                 del needs[name]
         for name in ("robot", *BRIEF):  # as wide again as it may be without what is left out
@@ -256,7 +257,7 @@ def _linked(station: Station) -> tuple[Mark, str, tuple[str, ...]]:
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     again = (f"linked {link.links} times",) if link.links > 1 else ()
-    parts = (f"{lost} lost", f"round trip {trip}", *again)
+    parts = (f"{lost} lost on the link", f"round trip {trip}", *again)
     if robot.age_s() is None:
         return Mark("ring", "old"), "Linked, no data yet", parts
     if robot.is_stale():

@@ -19,6 +19,7 @@ from gateway.wire.dictionary import OBJECT_READ, ObjectInfo
 from gateway.wire.parameter import PARAMETER_WRITE
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.objects.devices import Device, device_of, devices
 from server_gui.core.objects.facts import facts
@@ -30,6 +31,7 @@ from server_gui.views.objects.choice_bar import ChoiceBar
 from server_gui.views.objects.facts_card import FactsCard
 from server_gui.views.objects.objects_model import ShownObjects
 from server_gui.views.objects.objects_table import ObjectsTable
+from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
@@ -51,7 +53,7 @@ class ObjectsPage(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._frame = 0
+        self._frame, self._looked_ns = 0, 0
         self._devices: Sequence[Device] = ()
         self._chosen: dict[str, str] = {}  # by robot, the component that is looked at
         self._finder = Finder()
@@ -68,11 +70,12 @@ class ObjectsPage(QWidget):
     def refresh(self) -> None:
         """Show how it is now, and ask for what is in sight; called each frame while the tab is visible."""
         self._frame += 1
-        if self._frame % READ == 1:
+        if self._frame % READ == 1 or now_ns() - self._looked_ns >= READ_NS:
             self.look()
 
     def look(self) -> None:
         """Do so at once."""
+        self._looked_ns = now_ns()
         station = self._desk.selected
         self._arrange()
         if station is None:

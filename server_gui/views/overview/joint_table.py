@@ -202,6 +202,8 @@ class BarDelegate(SentenceDelegate):
             option.text = text.partition(" ")[0] if text.startswith("0x") else BELOW
         elif self.is_tight and index.column() == STATE:
             option.text = in_few_words(text)
+        if isinstance(index.data(BAR), Bar):  # which lies below it
+            option.displayAlignment = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         super().paint(painter, option, index)
@@ -209,13 +211,13 @@ class BarDelegate(SentenceDelegate):
         if not isinstance(bar, Bar):
             return
         box = QRectF(option.rect.adjusted(6, 0, -6, 0))
-        field = QRectF(box.left(), box.bottom() - 3, box.width(), 2)
+        field = QRectF(box.left(), box.bottom() - 2, box.width(), 2)
         painter.fillRect(field, self._theme.colour("border"))
         share = min(max(bar.share, -1.0), 1.0)
         middle, reach = field.center().x(), field.width() / 2 * abs(share)
         left = middle if share >= 0 else middle - reach
         painter.fillRect(QRectF(left, field.top() - 1, reach, 4), self._theme.colour(bar.colour))
-        painter.fillRect(QRectF(middle - 0.5, field.top() - 2, 1, 6), self._theme.colour("dim"))
+        painter.fillRect(QRectF(middle - 0.5, field.top() - 1, 1, 4), self._theme.colour("dim"))
 
 
 class JointTable(QTableView):

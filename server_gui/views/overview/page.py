@@ -6,9 +6,9 @@ Where not all of it is seen at once, the joints come before the pictures: their 
 from collections.abc import Collection
 from typing import Final
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
 from server_gui.core.desk.confidence import not_judged
@@ -40,7 +40,7 @@ A_COLUMN: Final = 190  # wide at least, at text of 100 %
 SPARE: Final = 100  # high, likewise: so much must be left for lines and alarms that come
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
-SHARE: Final = 0.05  # of both feet: a figure that is further off than its picture is read at once
+OFF_N: Final = 50.0  # a figure that is further off than its picture is read at once
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
     PlotKind(
@@ -76,7 +76,7 @@ class Overview(QWidget):
         self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
-        self._share: float | None = None  # of the left foot, as it was read last
+        self._forces: dict[str, float | None] = dict.fromkeys(SIDES)  # under the feet, as they were read last
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
@@ -169,6 +169,8 @@ class Overview(QWidget):
         for row in range(9):
             is_plots = (row - first) * columns >= len(cards)
             grid.setRowStretch(row, 0 if row in (0, joints) or row >= last else 6 if is_plots else 10)
+        for one in (self._joints, self):  # else a frame is drawn in which words lie over the table
+            QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
 
     def read_now(self) -> None:
         """Let the next frame show also what is read: what stands beside it is shown anew then."""
@@ -297,14 +299,18 @@ class Overview(QWidget):
             self._maps[side].show_pressures(pressures, cop, live=live)
 
     def _is_off(self, station: Station) -> bool:
-        """Return whether a foot carries by much another share than its figure says."""
-        left = loads(station.robot)[SIDES[0]].share
-        return left is not None and (self._share is None or abs(left - self._share) > SHARE)
+        """Return whether a foot carries much more or less than its figure says."""
+        carried = {side: loads(station.robot)[side].force for side in SIDES}
+        return any(
+            (force is None) is not (self._forces[side] is None)
+            or abs((force or 0.0) - (self._forces[side] or 0.0)) > OFF_N
+            for side, force in carried.items()
+        )
 
     def _refresh_soles(self, station: Station, *, live: bool) -> None:
         force = self._desk.shown.units.unit("force", "N")
         carried = loads(station.robot)
-        self._share = carried[SIDES[0]].share
+        self._forces = {side: carried[side].force for side in SIDES}
         for side in SIDES:
             known = sole(station.robot, side)
             if known != self._soles[side]:

@@ -19,12 +19,14 @@ from PySide6.QtWidgets import (
 
 from gateway.parameter_files.contents import FileProblem
 from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
+from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
 from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.several_joints import Offer
-from server_gui.core.tuning.writing import WriteState
+from server_gui.core.tuning.writing import WriteProgress, WriteState
+from server_gui.views.marks import time_of_day
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
 from server_gui.views.parameters.file_bar import FileBar
@@ -39,7 +41,8 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
-NEWS_S: Final = 60.0  # that something is as it should be, it is said in green
+ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
+NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
 
@@ -156,7 +159,7 @@ class ParametersPanel(QWidget):
         """Show exactly what would be written."""
         station = self._desk.selected
         if station is not None:
-            self.review.show_changes(station.difference(self._desk.shown.units))
+            self.review.show_changes(station.difference(self._desk.shown.units), _acts(station))
             self.pages.setCurrentIndex(REVIEW)
             # The button that led here gives way: else the next one in the window would have the keyboard.
             self.review.table.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -348,8 +351,8 @@ class ParametersPanel(QWidget):
 
     def _refresh_review(self, station: Station) -> None:
         now = station.difference(self._desk.shown.units)
-        if now != self.review.changes:
-            self.review.show_changes(now)
+        if (now, _acts(station)) != (self.review.changes, self.review.acts):
+            self.review.show_changes(now, _acts(station))
         if not now:
             self.pages.setCurrentIndex(EDIT)
 
@@ -372,6 +375,21 @@ class ParametersPanel(QWidget):
 def _enable_alike(actions: Mapping[QPushButton, QAction]) -> None:
     for button, action in actions.items():
         action.setEnabled(button.isEnabled())
+
+
+def _dated(writing: WriteProgress) -> tuple[str, str]:
+    """Return what came of the latest write: in green as news, then with the time of day."""
+    for_s = time.monotonic() - writing.said_s
+    if for_s < NEWS_S:
+        return writing.text, "good"
+    return f"{time_of_day(time.time() - for_s)}  {writing.text}", "plain"
+
+
+def _acts(station: Station) -> str:
+    """Return what is written to acts on, where somebody may stand in it."""
+    if not station.is_live:
+        return "Whether drives are enabled is not known now."
+    return ACTS if any_enabled(station.robot) else ""
 
 
 def _close_file(station: Station) -> None:
@@ -398,5 +416,5 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
     if not station.known:
         return "This robot lets no parameter be changed, or has not said which yet.", "plain"
     if writing.text:
-        return writing.text, "good" if time.monotonic() - writing.said_s < NEWS_S else "plain"
+        return _dated(writing)
     return "Double-click a value in the column New to change it.", "plain"

@@ -28,6 +28,7 @@ NUMBERS: Final = (OLD, NEW, BY, ALLOWED)
 SPARE: Final = (ALLOWED, BY)  # left out in this order where there is less room: no number is cut
 BESIDE: Final = 16  # pixels of the table's frame and its bar
 TRIAL_S: Final = 30
+ALL_OR_NONE: Final = "All or none, read back from the device. Nothing is stored to flash."
 SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
 
 
@@ -45,6 +46,7 @@ class Review(QWidget):
         super().__init__()
         self._theme = theme
         self.changes: tuple[ReviewedEdit, ...] = ()
+        self.acts = ""
         self._allowed = False
         self._settled = QTimer(self, singleShot=True)
         self._settled.timeout.connect(lambda: self._enable(self._allowed))
@@ -100,9 +102,9 @@ class Review(QWidget):
         everything.addWidget(self.leave_out)
         everything.addLayout(row)
 
-    def show_changes(self, changes: tuple[ReviewedEdit, ...]) -> None:
-        """Show the changes to be written."""
-        self.changes = changes
+    def show_changes(self, changes: tuple[ReviewedEdit, ...], acts: str = "") -> None:
+        """Show the changes to be written, and on what that `acts` at once."""
+        self.changes, self.acts = changes, acts
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):
             self._fill(row, change)
@@ -115,9 +117,7 @@ class Review(QWidget):
             said.append(
                 f"Changed elsewhere since you began: {', '.join(elsewhere)}. Writing overwrites that."
             )
-        self.said.setText(
-            "\n".join(said) or "All or none, read back from the device. Nothing is stored to flash."
-        )
+        self.said.setText("\n".join([*(said or [ALL_OR_NONE]), *filter(None, [acts])]))
         self.said.setProperty("tone", "bad" if said else "good")
         self.said.style().polish(self.said)
         self._enable(False)

@@ -60,8 +60,8 @@ def test_a_flood_after_a_stall_is_one_alarm_as_bad_as_its_worst() -> None:
     flood = [active(Kind.IMPLAUSIBLE, joint, 101.5) for joint in JOINTS]
     flood += [active(Kind.BUS, "bus.can0", 103.0), active(Kind.PART_STALE, "gait", 100.9)]
     (one,) = gathered([stood(), *flood], (STALL,), 104.0)
-    assert one.alarm.line == "computer paused: computer: the robot's computer stood still for 1.2 s"
-    assert (one.alarm.mark.colour, one.alarm.mark.word) == ("bad", "computer paused")
+    assert one.alarm.line == "computer halted: computer: the robot's computer stood still for 1.2 s"
+    assert (one.alarm.mark.colour, one.alarm.mark.word) == ("bad", "computer halted")
     assert "unreliable: left hip, left knee" in one.alarm.consequences
     assert len(one.alarm.under) == len(flood)
 

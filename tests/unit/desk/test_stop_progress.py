@@ -135,3 +135,20 @@ def test_a_stop_whose_drives_are_not_all_in_the_rows_is_timed_by_its_answer() ->
     stopping.show([20_000_000], {"left_knee": ["quick stop active"]}, 0)
     stopping.answered(number, ALL, at_ns=90_000_000)
     assert stopping.text == "STOP confirmed by all 2 drives in 90 ms"
+
+
+def test_a_stop_of_a_robot_that_is_stopped_leaves_the_proof_of_the_first() -> None:
+    """STOP ALL made 4 ms of the 95 ms in which a robot had come to a stop."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=0), ALL, at_ns=95_000_000)
+    first = (stopping.text, stopping.since_s)
+    again = stopping.sent(off=ALL.drives, at_ns=5_000_000_000)
+    assert stopping.stage == (StopState.SENT, True)
+    stopping.answered(again, ALL, at_ns=5_004_000_000)
+    assert (stopping.text, stopping.since_s) == first
+    assert stopping.text == "STOP confirmed by all 2 drives in 95 ms"
+    stopping.answered(stopping.sent(at_ns=9_000_000_000), UNREACHABLE, at_ns=9_500_000_000)
+    assert stopping.stage == (StopState.NOT_CONFIRMED, True)
+    stopping.was_reset(held=False)
+    stopping.answered(stopping.sent(at_ns=20_000_000_000), ALL, at_ns=20_030_000_000)
+    assert stopping.text.endswith("in 30 ms"), "it was enabled since"

@@ -78,6 +78,20 @@ def test_a_node_that_sends_no_pdos_does_not_hide_that_the_computer_is_busy() -> 
     assert "busy" in findings(bus)[0][0]
 
 
+def test_the_cause_does_not_change_with_each_look() -> None:
+    """The remedy was cables while the computer's load was a few percent lower, or a node was fine."""
+    each = [replace(NODE, node_id=number, pdos_missing_percent=9.0) for number in range(1, 7)]
+    watched, bus = (
+        MissingPdos(),
+        replace(BUS, nodes=[*each, replace(NODE, node_id=16, pdos_missing_percent=0.0)]),
+    )
+    for second, percent in enumerate((97.0, 70.0, None, 95.0, 80.0)):
+        (told,) = watched.take((bus,), second * 2 * SECOND_NS, percent)
+        assert "busy" in findings(told)[0][0], second
+    (told,) = watched.take((bus,), 40 * SECOND_NS, 60.0)
+    assert "busy" not in findings(told)[0][0]
+
+
 def test_where_one_node_is_told_no_other_with_as_many_looks_fine() -> None:
     watched, of_look = MissingPdos(), ((20.0, 2.3, 0.4), (0.0, 0.0, 0.0))
     told = []
