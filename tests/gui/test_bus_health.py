@@ -78,11 +78,11 @@ def test_how_often_it_was_opened_is_in_words(
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
-    assert view.said.text() == "bus fails: main: it is full: 100 % of its time is taken"
+    assert view.said.text() == "bus full: main: it is full: 100 % of its time is taken"
     assert view.checks.text().startswith("→ 89 % of its frames are from left knee, the most: send fewer PDOs")
     assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"
-    assert view.cards[0]._icon.accessibleName() == "bus fails"
+    assert view.cards[0]._icon.accessibleName() == "bus full"
     show(view, bench, BUS)
     assert not view.said.isVisible()
     assert not view.checks.isVisible()
@@ -110,11 +110,15 @@ def test_the_last_line_has_the_worst_bus(bar: StatusBar, bench: Bench) -> None:
     bench.station.take([BusesSeen((replace(BUS, load_percent=100.0),), time.monotonic_ns())])
     bar.refresh()
     assert bar.bus.text() == "CAN main 100 %, 4 errors: it is full · 89 % of its frames are from left knee"
-    assert bar._bus_icon.accessibleName() == "bus fails"
+    assert bar._bus_icon.accessibleName() == "bus full"
 
 
 def test_no_bus_is_good_on_the_last_line_where_nothing_new_comes(bar: StatusBar, bench: Bench) -> None:
     good = replace(BUS, load_percent=13.0, findings=(), nodes=())
+    busy = replace(good, load_percent=85.0)
+    bench.station.take([walking(10, 70.0), BusesSeen((busy,), time.monotonic_ns())])
+    bar.refresh()
+    assert bar.bus.text() == "bus not known", "nor is a warning of before shown as one of now"
     for age_s, said in ((70.0, "bus not known"), (0.0, "CAN main 13 %")):
         bench.station.take([walking(10, age_s), BusesSeen((good,), time.monotonic_ns())])
         bar.refresh()

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import NOTHING_SENT, ConnectionState
-from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.overload import load_first, overloaded
@@ -377,13 +377,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
         return
     now = bus_health.seen(robot)
     for bus in robot.description.buses if now is None else now:
-        said = bus_health.trouble(bus)
-        if said is None or (bus.state == CLOSED and bus.problem is None):
-            continue
-        what, check = said
-        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.BusHealthLevel.ALARM else Kind.BUS
-        where, is_now = bus.name, now is not None
-        yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
+        yield from bus_alarms(bus, is_now=now is not None)
 
 
 # --- danger

@@ -25,11 +25,13 @@ class Kind(Enum):
     NO_DATA = "no data yet"
     STALE = "stale"
     BUS_FAILS = "bus fails"
+    BUS_FULL = "bus full"
     NOT_RECORDED = "not recorded"
     STOPPED = "STOPPED"
     PART_STALE = "component stale"
     STALLED = "computer paused"
     UNKNOWN = "state not known"
+    BUS_BUSY = "bus busy"
     BUS = "bus trouble"
     BLIND = "guard blind"
     DANGER_ADVICE = "danger possible"
@@ -126,6 +128,8 @@ TEXTS: Final = dict(
             "old",
             "the robot says of it what this window does not know: update the window",
         ),
+        _text(Kind.BUS_FULL, "square", "bad", "find what sends so much; send less"),
+        _text(Kind.BUS_BUSY, "triangle", "warn", "find what sends so much; send less"),
         _text(Kind.BUS, "triangle", "warn", "check termination, wiring, bitrate and load (gwrms describe)"),
         _text(
             Kind.BUS_FAILS, "square", "bad", "check termination, wiring, bitrate and load (gwrms describe)"

@@ -7,11 +7,12 @@ from typing import Final
 
 from gateway.wire.bus import BusInfo, NodeInfo
 from server_gui.core.alarms.alarm import Alarm, Alarms
+from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.marks import NOT_KNOWN, STATES, Mark, age_text
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.follow.missing_pdos import told_percent
 from server_gui.core.follow.robot import FollowedComponent
-from server_gui.core.processing.bus_health import BusHealthLevel, findings, level, node_level, trouble
+from server_gui.core.processing.bus_health import BusHealthLevel, findings, node_level
 from server_gui.core.processing.bus_senders import Talking, kinds, talking, total, whole_numbers
 
 UNKNOWN: Final = "–"
@@ -90,8 +91,8 @@ def lines(buses: Sequence[BusInfo], alarms: Alarms) -> list[tuple[bool, str]]:
     """
     about = _about(buses)
     told = {alarm.subject for alarm in alarms.each}
-    made = (_as_alarm(bus) for bus in buses if f"bus.{bus.name}" not in told)
-    tops = [*(one.alarm for one in alarms.active), *(one for one in made if one is not None)]
+    made = (one for bus in buses if f"bus.{bus.name}" not in told for one in bus_alarms(bus))
+    tops = [*(one.alarm for one in alarms.active), *made]
     found: dict[str, bool] = {}
     for top in sorted(tops, key=lambda alarm: alarm.rank):
         under = [one for one in top.under if one.subject in about]
@@ -131,15 +132,6 @@ def _about(buses: Iterable[BusInfo]) -> set[str]:
         for bus in buses
         for subject in (f"bus.{bus.name}", *(name for node in bus.nodes for name in node.components))
     }
-
-
-def _as_alarm(bus: BusInfo) -> Alarm | None:
-    """Return what is wrong with a bus as its alarm will say it, where that is not told yet."""
-    said = trouble(bus)
-    if said is None:
-        return None
-    kind = Kind.BUS_FAILS if level(bus) is BusHealthLevel.ALARM else Kind.BUS
-    return Alarm(kind, f"bus.{bus.name}", said[0], bus.name)
 
 
 def _silence(node: NodeInfo, parts: Mapping[str, FollowedComponent], talk: Talking | None) -> str | None:

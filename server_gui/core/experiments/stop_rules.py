@@ -22,6 +22,7 @@ NO_REASON: Final = frozenset(
     {
         Kind.STALE,
         Kind.BUS,
+        Kind.BUS_BUSY,
         Kind.NOT_RECORDED,
         Kind.RECORDING,
         Kind.UPLOAD,

@@ -34,6 +34,7 @@ class BusHealthLevel(Enum):
 
 
 ORDER: Final = tuple(BusHealthLevel)
+Rated = tuple[BusHealthLevel, str, str]  # how bad, what, and what to check
 
 
 def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
@@ -96,9 +97,19 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
 
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
     """Return a bus's problems, and what to check if that is known; None if there are none."""
-    told = findings(bus)
-    said = _joined(GROWS.sub("", words) for words, _ in told)
-    return (said, _joined(check for _, check in told)) if told else None
+    return joined(rated(bus))
+
+
+def joined(found: Iterable[Rated]) -> tuple[str, str] | None:
+    """Return what is wrong, and what to check, in one; None of nothing."""
+    told = list(found)
+    said = _joined(GROWS.sub("", words) for _, words, _ in told)
+    return (said, _joined(check for _, _, check in told)) if told else None
+
+
+def of_load(one: Rated) -> bool:
+    """Return whether it is the load of a bus: it begins and ends by itself."""
+    return one[1].endswith(TAKEN)
 
 
 def findings(bus: BusInfo) -> list[tuple[str, str]]:
@@ -106,7 +117,7 @@ def findings(bus: BusInfo) -> list[tuple[str, str]]:
     return [(words, check) for _, words, check in rated(bus)]
 
 
-def rated(bus: BusInfo) -> list[tuple[BusHealthLevel, str, str]]:
+def rated(bus: BusInfo) -> list[Rated]:
     """Return each thing that is wrong with a bus: how bad that is by itself, and what to check."""
     if level(bus) in (BusHealthLevel.GOOD, BusHealthLevel.UNKNOWN):
         return []

@@ -17,12 +17,16 @@ from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel
 from server_gui.views.frame.recording_chip import TONES
 from server_gui.views.resources.bus_card import LEVELS, shown_mark
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 FRAMES: Final = 60
+FRAMES_HINT: Final = (
+    "Frames that this window draws a second; while this computer is busy, what is shown is late"
+)
+FULL: Final = "▲ this computer is busy · "
 STOP: Final = (
     "STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop",
     "F12: software stop, not an emergency stop",
@@ -73,8 +77,10 @@ class StatusBar(QStatusBar):
         self.bus.say(*words)
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
-        set_text(self._window, f"{self._rate():.0f} fps")
-        set_tip(self._window, "frames that this window draws a second")
+        is_full = station is not None and station.is_full()
+        set_text(self._window, f"{FULL if is_full else ''}{self._rate():.0f} fps")
+        set_tone(self._window, "warn" if is_full else "")
+        set_tip(self._window, FRAMES_HINT)
         QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)  # no number is drawn where it was
 
     def _refresh_recording(self, station: Station | None) -> None:
@@ -108,8 +114,7 @@ def _bus(station: Station) -> tuple[Mark, tuple[str, ...]]:
                 f"CAN {name}{load}: {cause.mark.word}{whom}"
                 for name, whom in ((f"{bus.name} ", f" {cause.spoken}"), ("", f" {cause.spoken}"), ("", ""))
             )
-    is_known = level is not BusHealthLevel.GOOD or station.is_live
-    if not is_known:
+    if not station.is_live and level is not BusHealthLevel.ALARM:
         return LEVELS[BusHealthLevel.UNKNOWN], (UNKNOWN, "CAN –")
     told = (mark for mark in marks.values() if mark.colour == LEVELS[level].colour and mark != LEVELS[level])
     return next(told, LEVELS[level]), words

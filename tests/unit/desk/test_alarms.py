@@ -435,11 +435,24 @@ FINE = BusInfo("main", "error active", 1_000_000, 41.0, 1010.0, 0, 0, 1, 0, [])
 def test_a_bus_that_is_full_now_is_an_alarm_and_is_over_when_it_is_not(bench: Bench) -> None:
     bench.station.take([BusesSeen((replace(FINE, load_percent=100.0),), time.monotonic_ns())])
     (one,) = bench.station.alarms.active
-    assert (one.alarm.kind, one.alarm.is_now) == (Kind.BUS_FAILS, True)
+    assert (one.alarm.kind, one.alarm.is_now) == (Kind.BUS_FULL, True)
     assert one.alarm.what == "it is full: 100 % of its time is taken"
     assert bench.station.mark.colour == "bad"
     bench.station.take([BusesSeen((FINE,), time.monotonic_ns())])
     assert kinds(bench.station) == []
+
+
+def test_the_load_of_a_bus_has_a_beginning_of_its_own(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It seemed to be as old as the PDOs that had been missing since long before."""
+    passive = replace(FINE, state="error passive")
+    bench.station.take([BusesSeen((passive,), time.monotonic_ns())])
+    (before,) = bench.station.alarms.active
+    now_s = time.time() + 60.0
+    monkeypatch.setattr("server_gui.core.follow.robot.Robot.now_s", lambda _robot: now_s)
+    bench.station.take([BusesSeen((replace(passive, load_percent=90.0),), time.monotonic_ns())])
+    since = {one.alarm.kind: one.since_s for one in bench.station.alarms.active}
+    assert since[Kind.BUS] == before.since_s
+    assert since[Kind.BUS_BUSY] >= before.since_s + 59.0
 
 
 def test_what_a_robot_told_of_its_buses_with_the_link_counts_until_somebody_looks(bench: Bench) -> None:
