@@ -1,5 +1,6 @@
 """An alarm in words: whose it is and what is wrong, since when, what follows from it, and what to check."""
 
+import re
 import time
 from collections.abc import Iterable
 from typing import Final
@@ -16,6 +17,7 @@ from server_gui.views.marks import Mark, time_of_day
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
+BREAK: Final = re.compile("[;,] ")  # between things to check
 SINCE: Final = "since "
 REMEDY: Final = "→"  # what there is to check, or to do
 
@@ -103,7 +105,7 @@ def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts for less and less room: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
     bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
-    first = [f"{begins}{MORE}" for one in check if (begins := one.partition("; ")[0]) != one]
+    first = [f"{begins}{MORE}" for one in check if (begins := BREAK.split(one, maxsplit=1)[0]) != one]
     with_check = (
         said,
         [since, *said[1:]],
