@@ -47,7 +47,7 @@ def test_recordings_of_store_and_spool_are_listed_with_what_is_in_them(
         shown.draw()
         said = page.details.toPlainText()
         assert "Operator: Ada" in said
-        assert "marker: stairs" in said
+        assert "mark: stairs" in said
         assert page.play.isEnabled()
 
 
@@ -100,7 +100,7 @@ def test_playback_is_marked_never_mixed_with_what_is_live_and_shows_what_was_pre
     assert bench.station.stopping.state is StopState.CONFIRMED
     assert played.stopping.state is StopState.IDLE
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
-    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
+    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk\u00a094\u00a0%"), "showed it")
     lines, activity = player.overview.status_lines, player.overview.now.activity
     whole.until(lambda: activity.main.text().startswith("Walk 94 %"), "said it large")
     axis = player.overview._plots[0].plot.getPlotItem().getAxis("bottom")

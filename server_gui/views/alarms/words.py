@@ -15,6 +15,7 @@ from server_gui.views.marks import Mark, time_of_day
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
+UNSEEN: Final = "as far as it is replayed: buses and computers are not"
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -34,7 +35,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
     if station.robot.is_recording:
-        return Mark("diamond", "accent"), "No alarm then", "in the recording, at this instant"
+        return Mark("diamond", "accent"), "No alarm then", UNSEEN
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
     if station.mark.colour in ("warn", "bad", "old"):  # as its card says

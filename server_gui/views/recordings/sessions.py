@@ -1,6 +1,6 @@
 """Every recorded session, newest first: what is known of it, what happened in it; to be played."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Final
 
@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 
 from gateway.amounts import size
 from gateway.plain_text import plain
-from ml.store.labels import utc_ns
 from ml.store.sessions import UNREAD, Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.flags import Flag, of_events
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
@@ -331,9 +331,10 @@ def _inside(tape: Tape, *, is_partial: bool) -> list[str]:
         head = f"{head}: {PARTIAL}"
     if not tape.events:
         return [head] if is_partial else [head, "It has no gaps and no marks."]
-    return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
+    return [head, "", *(_event(tape, flag) for flag in of_events(tape.events[:EVENTS_TOLD]))]
 
 
-def _event(tape: Tape, row: Mapping[str, Any]) -> str:
-    at = clock_text(max(utc_ns(row["utc"]) - tape.first_ns, 0) / SECOND_NS, 1)
-    return f"{at}  {'◆' if row['kind'] == 'marker' else '▲'} {row['kind']}: {row['text']}"
+def _event(tape: Tape, flag: Flag) -> str:
+    """Return what happened when, in the words of the time axis."""
+    at = clock_text(max(flag.at_ns - tape.first_ns, 0) / SECOND_NS, 1)
+    return f"{at}  {flag.kind.value}: {flag.text}"
