@@ -206,7 +206,10 @@ def store_gone(bench: Bench) -> None:
     hand.click("Upload now")
     hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
-    for title, key, words in (("models", "alt+m", "Train a model"), ("recordings", "alt+c", "retrying")):
+    for title, key, words in (
+        ("models", "alt+m", "Train a model"),
+        ("recordings", "alt+c", "others may be in"),
+    ):
         hand.key(key)
         hand.sees(words)
         hand.keep(f"store-gone-{title}")
