@@ -371,8 +371,10 @@ def _ended(session: Session, *, is_now: bool) -> str:
 
 def _length(session: Session, *, away: bool, is_now: bool) -> str:
     """Return how long it is; of one that is recorded now the header says it, and here is what is kept."""
+    if is_now and not session.rows:
+        return f"it {GOES_ON}"
     if away and not session.rows:
-        return f"it {GOES_ON}" if is_now else NOT_KNOWN
+        return NOT_KNOWN
     length, rows, size_ = (_cells(session)[column] for column in (LENGTH, ROWS, SIZE))
     return f"it {GOES_ON}; kept so far: {rows} rows, {size_}" if is_now else f"{length}, {rows} rows, {size_}"
 
