@@ -1,5 +1,6 @@
 """A plot that is cheap to draw 30 times a second: pyqtgraph's axes, cached, around our own raster."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -415,7 +416,7 @@ def faint(colour: QColor, behind: QColor) -> QColor:
 
 
 def _mixed(colour: QColor, behind: QColor, share: float) -> QColor:
-    pairs = zip(colour.getRgb()[:3], behind.getRgb()[:3], strict=True)
+    pairs = zip(_parts(colour), _parts(behind), strict=True)
     return QColor(*(round(share * one + (1 - share) * other) for one, other in pairs))
 
 
@@ -426,11 +427,15 @@ def contrast(one: QColor, other: QColor) -> float:
 
 
 def _luminance(colour: QColor) -> float:
-    parts = (part / 255 for part in colour.getRgb()[:3])
+    parts = (part / 255 for part in _parts(colour))
     red, green, blue = (
-        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+        part / 12.92 if part <= 0.04045 else math.pow((part + 0.055) / 1.055, 2.4) for part in parts
     )
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def _parts(colour: QColor) -> tuple[int, int, int]:
+    return colour.red(), colour.green(), colour.blue()
 
 
 def css(theme: Theme, name: str) -> str:
