@@ -21,6 +21,7 @@ from ml.store.private import private_files
 from server_gui.cli.cloud_options import add_url, parser, url, when
 from server_gui.cli.models_show import told
 from server_gui.core.models.catalogue import Serving, open_registry, why_it_cannot_serve
+from server_gui.core.models.changes import loss
 from server_gui.core.models.names import EVERY
 from server_gui.core.settings.promoters import UNSIGNED, own_line
 from server_gui.core.settings.server_file import load
@@ -133,6 +134,8 @@ def promote(argv: list[str]) -> int:
         warn("models", f"the server's file has no robot {arguments.robot!r}{close}")
     old = arguments.instead_of
     over = "" if old == NOTHING else old and _named(registry, old)
+    if lost := loss(registry, registry.promotable(model, arguments.robot), arguments.robot):
+        warn("models", lost)
     done = registry.promote(model, arguments.robot, who=arguments.who, why=arguments.why, over=over)
     return _tell(arguments, registry.card(model).task, done)
 

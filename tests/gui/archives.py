@@ -10,6 +10,7 @@ import pytest
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication, QTabWidget
 
+from gateway.client import Batch
 from ml.store import Store
 from server_gui.core.archive.archive import Archive
 from server_gui.core.fleet.live_prediction import record as record_of
@@ -37,11 +38,16 @@ RATE_HZ = 50
 
 
 def record(
-    settings: ServerSettings, *, sent: bool = True, facts: Facts = ADA, fault_s: float | None = None
+    settings: ServerSettings,
+    *,
+    sent: bool = True,
+    facts: Facts = ADA,
+    fault_s: float | None = None,
+    gap: bool = False,
 ) -> str:
     """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker.
 
-    From `fault_s` on the left knee's drive is in fault.
+    From `fault_s` on the left knee's drive is in fault; with a `gap` rows were dropped in the middle.
     """
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
     if fault_s is not None:
@@ -53,7 +59,8 @@ def record(
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}
             session = recorder.begin("exo-01", msgspec.structs.replace(facts, units=units))
-            recorder.record("exo-01", 1, walk, 0)
+            for batch in halves(walk) if gap else (walk,):
+                recorder.record("exo-01", 1, batch, 0)
             recorder.add(
                 *(foretold(session, at_ns) for at_ns in walk.stamps_ns[: len(walk.stamps_ns) // 2 : 5])
             )
@@ -61,6 +68,20 @@ def record(
         for number in spool.waiting() if sent else ():
             send(spool, number, Store(settings.store.url))
     return session
+
+
+def halves(walk: Batch) -> tuple[Batch, Batch]:
+    """Return a walk as two notifications, between which the robot has dropped rows."""
+    middle = len(walk.stamps_ns) // 2
+    first, then = (
+        dataclasses.replace(
+            walk,
+            stamps_ns=walk.stamps_ns[rows],
+            columns={name: values[rows] for name, values in walk.columns.items()},
+        )
+        for rows in (slice(None, middle), slice(middle, None))
+    )
+    return first, dataclasses.replace(then, seq=walk.seq + 1, dropped=12)
 
 
 def foretold(session: str, stamp_ns: int) -> Record:

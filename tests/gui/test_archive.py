@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
@@ -17,6 +18,7 @@ from gateway.wire.stop import Stopped
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import JobState
+from server_gui.core.desk.recording import By, Recording
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import ServerSettings
@@ -27,6 +29,7 @@ from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.time_axis import SHOWN
 from tests.gui.archives import RATE_HZ, SECONDS, Shown, cell, play, record
 from tests.gui.fakes import Bench
+from tests.gui.test_recording import FakeKeeper, report
 from tests.support.desk import walking
 from tests.support.journals import RobotsJournal
 
@@ -47,8 +50,46 @@ def test_recordings_of_store_and_spool_are_listed_with_what_is_in_them(
         shown.draw()
         said = page.details.toPlainText()
         assert "Operator: Ada" in said
-        assert "marker: stairs" in said
+        assert "mark: stairs" in said
         assert page.play.isEnabled()
+
+
+def test_a_recording_that_goes_on_is_said_to_be_recorded_now_with_one_length(
+    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
+) -> None:
+    name = record(settings, sent=False)
+    shown.open("Recordings")
+    page = shown.window.tabs.recordings.list
+    shown.until(lambda: page.sessions.rowCount(), "listed it")
+    made = report()
+    link = msgspec.structs.replace(made.robots["exo-01"], session=name)
+    keeper = FakeKeeper(msgspec.structs.replace(made, robots={"exo-01": link}))
+    page._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+    page._recording.look()
+    page.sessions.take([msgspec.structs.replace(archive.library.found.sessions[0], ended=None)])
+    page.table.selectRow(0)
+    shown.until(lambda: archive.tape, "looked into it")
+    shown.draw()
+    said = page.details.toPlainText()
+    assert "Ended: not yet: it is recorded now" in said
+    assert "killed" not in said
+    assert "Length: it goes on\n" in said
+    assert "Its first 0:12.0 can be played by now" in said
+    assert [page.table.model().index(0, column).data() for column in (2, 5)] == ["goes on", "recorded now"]
+
+
+def test_the_list_says_that_the_store_is_away_before_its_first_frame(
+    shown: Shown, archive: Archive, settings: ServerSettings
+) -> None:
+    record(settings)
+    shown.open("Recordings")
+    page = shown.window.tabs.recordings.list
+    shown.until(lambda: page.sessions.rowCount(), "listed it")
+    shown.open("Cloud")
+    archive.library.reach.looked("it cannot be reached")
+    shown.window.tabs.setCurrentIndex(0)
+    assert page.said.text() == "The store is not reached, tried again by itself: it cannot be reached"
+    assert page._list.note.startswith("1 session known")
 
 
 def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) -> None:
@@ -100,7 +141,7 @@ def test_playback_is_marked_never_mixed_with_what_is_live_and_shows_what_was_pre
     assert bench.station.stopping.state is StopState.CONFIRMED
     assert played.stopping.state is StopState.IDLE
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
-    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
+    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk\u00a094\u00a0%"), "showed it")
     lines, activity = player.overview.status_lines, player.overview.now.activity
     whole.until(lambda: activity.main.text().startswith("Walk 94 %"), "said it large")
     axis = player.overview._plots[0].plot.getPlotItem().getAxis("bottom")
@@ -257,7 +298,7 @@ def test_both_tabs_are_drawn_dark_and_light_and_everything_in_reach_has_a_name(
 
 
 def test_what_a_recording_began_with_is_in_the_window_s_units(archive: Archive, bench: Bench) -> None:
-    held = {"gait.step_length": 0.43, "gait.trunk_angle": None, "gone.gain": 2.0}
+    held = {"gait.step_length": 0.4300000131, "gait.trunk_angle": None, "gone.gain": 2.0}
     assert archive.held_then(Session("exo-01", "s", parameters=held)) == [
         "gait.step_length = 430 mm",
         "gone.gain = 2 (SI)",

@@ -65,7 +65,9 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     shown.until(lambda: "Connection refused" in shown.window.tabs.cloud.state.text(), "said so")
     assert shown.window.tabs.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
-    assert "retrying" in shown.window.tabs.recordings.list.said.text()
+    page = shown.window.tabs.recordings.list
+    assert "not reached, tried again by itself" in page.said.text()
+    assert page._list.note == "0 sessions known; others may be in the store"
     away[0] = False
     shown.until(lambda: shown.window.tabs.recordings.list.sessions.rowCount(), "came back")
     shown.open("Cloud")
@@ -88,9 +90,38 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording.look()
     shown.draw()
     assert "2 batches wait" in cloud.waiting.text()
-    assert "Retried automatically: the store cannot be reached" in cloud.waiting.text()
+    assert "Not uploaded, tried again by itself: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
+    said = "what was recorded until now waits for the store: an upload failed, tried again by itself"
+    assert said in [item.text for item in bench.desk.news.items]
+
+
+def test_while_the_store_is_away_the_button_tries_again_at_once(
+    shown: Shown, archive: Archive, settings: ServerSettings, tmp_path: Path, bench: Bench
+) -> None:
+    record(settings)
+    shown.open("Cloud")
+    cloud, reach = shown.window.tabs.cloud, archive.library.reach
+    shown.until(lambda: reach.state is Reach.REACHED, "reached it")
+    shown.draw()
+    assert cloud.upload.text() == "Upload now"
+    reach.looked("it cannot be reached")
+    shown.draw()
+    assert cloud.upload.text() == "Try again now"
+    assert cloud.upload.isEnabled()
+    keeper = FakeKeeper(report())
+    cloud._recording = recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+    recording.rely_on(reach)
+    recording.look()
+    assert not reach.is_due, "nobody else looks again"
+    cloud.upload.click()
+    assert keeper.asked[0] == "upload"
+    said = "what was recorded until now waits for the store: it is not reached, tried again by itself"
+    assert said in [item.text for item in bench.desk.news.items]
+    shown.until(lambda: reach.state is Reach.REACHED, "looked at once")
+    cloud.upload.click()
+    assert "what was recorded until now goes to the store" in [item.text for item in bench.desk.news.items]
 
 
 def test_a_job_shows_how_far_it_is_and_can_be_cancelled(shown: Shown, archive: Archive) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit
 
 from server_gui.views.theme import PALETTES, STYLE, Colours, Look, Theme
+from server_gui.views.widgets.plot import Curve, ink
 from tests.gui.test_window import contrast
 
 TEXT, GRAPHIC = 4.5, 3.0  # WCAG 2.2: 1.4.3 and 1.4.11
@@ -76,3 +77,15 @@ def test_what_an_empty_field_asks_for_can_be_read(
     assert hint.alpha() == 255
     assert contrast(hint.name(), theme.colours.field) >= TEXT
     field.deleteLater()
+
+
+@pytest.mark.parametrize("look", Look)
+def test_curves_of_what_is_beside_are_fainter_than_the_first_ones_and_seen_all_the_same(
+    theme: Theme, look: Look
+) -> None:
+    theme.set(look)
+    card = theme.colours.card
+    for name in ("left", "right", *CURVES):
+        first, beside = (ink(theme, Curve("a", name, dashed)).name() for dashed in (False, True))
+        assert contrast(beside, card) >= GRAPHIC, name
+        assert contrast(first, card) >= 1.3 * contrast(beside, card), name

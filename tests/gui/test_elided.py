@@ -22,6 +22,17 @@ def test_half_a_number_is_never_shown(qt: QApplication, room: int) -> None:
     assert metrics.horizontalAdvance(shown) <= max(room, metrics.horizontalAdvance("its …"))
 
 
+def test_of_a_sentence_with_a_long_path_as_much_is_shown_as_has_room(qt: QApplication) -> None:
+    metrics = QFontMetrics(QApplication.font())
+    path = "/tmp/a-folder-with-a-long-name/spool/of-this-computer"
+    for said in (f"recording: {path} cannot be read", f"{path}: it cannot be read"):
+        room = metrics.horizontalAdvance(said[:40])
+        shown = whole_words(said, metrics, room)
+        assert said.startswith(shown.removesuffix("…").rstrip())
+        assert metrics.horizontalAdvance(shown) <= room
+        assert len(shown) > 30, "more than its first word"
+
+
 def test_a_sentence_in_a_table_ends_with_a_whole_word_and_other_columns_are_as_ever(qt: QApplication) -> None:
     table, delegate = QTableWidget(1, 2), SentenceDelegate(1)
     for column in (0, 1):

@@ -137,6 +137,20 @@ def test_what_is_known_of_a_store_that_is_away_promotes_nothing(
         assert "is not reached" in button.toolTip()
 
 
+def test_the_page_knows_of_a_store_that_is_gone_before_its_first_frame(
+    shown: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, (_, other) = opened(shown), both
+    choose(shown, page, other)
+    assert page.promote.isEnabled()
+    shown.open("Recordings")
+    monkeypatch.setattr(archive.models.reach, "problem", "there is no store any more")
+    page.show()
+    assert not page.promote.isEnabled(), "as the rest of the window knows"
+    assert page.state.text().startswith("▲ The store is not reached")
+    assert "as known before" in page.compare.note, "also where the list is out of sight"
+
+
 def test_what_training_has_said_of_a_model_is_read_again_before_it_is_promoted(
     shown: Shown, both: tuple[Card, Card], archive: Archive
 ) -> None:

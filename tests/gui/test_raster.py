@@ -141,3 +141,19 @@ def test_nothing_new_is_nothing_to_draw() -> None:
 def test_nothing_that_a_robot_may_send_breaks_it(values: list[float], width: int, height: int) -> None:
     view = View(1.0, -2.0, 2.0, width, height)
     drawn(np.linspace(-1, 0, len(values)), np.array(values, np.float64), view)
+
+
+@pytest.mark.parametrize("values", [np.zeros(400), np.sin(np.linspace(0, 20, 400)) / 2])
+def test_beside_a_dashed_line_the_other_is_bold_also_where_it_grows(values: Floats) -> None:
+    times, inks = np.linspace(-10, 0, 400), Inks((INK, INK + 1), (False, True))
+    below = np.full(400, -0.9)
+    whole, grown = Strip(), Strip()
+    whole.draw("robot", VIEW, times, [values, below], inks)
+    for upto in (250, 251, 320, 400):
+        grown.draw("robot", VIEW, times[:upto], [values[:upto], below[:upto]], inks)
+    assert (unrolled(whole) == unrolled(grown)).all(), "what was drawn is as bold as what is new"
+    alone = drawn(times, values, VIEW) == INK
+    bold = unrolled(whole) == INK
+    assert (bold | ~alone).all(), "it is where it was"
+    assert bold.sum() > 1.5 * alone.sum()
+    assert {int(count) for count in (unrolled(whole) == INK + 1).sum(axis=0)} == {0, 1}, "the other is thin"

@@ -1,11 +1,16 @@
 """A recording with a fault in it: the alarm of that time is shown again, and leads to its signal."""
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu
 
 from server_gui.core.archive.archive import Archive
+from server_gui.core.desk.flags import FlagKind
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
 from server_gui.views.recordings.timeline import clock_text
+from server_gui.views.widgets.cursors import FIRST, FLAGS
 from tests.gui.archives import Shown, play, record
 
 FAULT_S = 5.0
@@ -57,6 +62,7 @@ def test_back_before_the_fault_its_line_says_that_there_was_none_then(
     archive.playback.seek(tape.first_ns + 1_000_000_000)
     shown.until(lambda: not player.alarms.told, "went back")
     shown.until(lambda: player.alarms.headline.text() == "No alarm then", "said so")
+    assert "buses and computers are not" in player.alarms.details.text(), "nobody has looked at these"
     assert player.alarms.isVisible(), "nothing moves"
 
 
@@ -106,3 +112,34 @@ def test_a_recording_that_stands_still_is_said_to_be_paused_alone(
     player.signals.pause.click()
     shown.draw()
     assert player.signals.said.text() == "Paused"
+
+
+def test_a_replay_says_of_what_it_shows_no_alarms(player: Player) -> None:
+    assert player.alarms.isHidden(), "nothing was wrong, as far as is known"
+    assert player.unseen.isVisible()
+    assert "without alarms of buses and computers" in player.unseen.text()
+
+
+def test_a_gap_is_an_event_like_the_others(shown: Shown, archive: Archive, settings: ServerSettings) -> None:
+    record(settings, gap=True)
+    play(shown, archive)
+    player, tape = shown.window.tabs.recordings.player, archive.playback.tape
+    assert tape is not None
+    said = "gap: the robot dropped 12 rows: it was too busy, or we read too slowly"
+    shown.until(lambda: any(flag.kind is FlagKind.GAP for flag in player._in_order), "found it")
+    player._list_events(menu := QMenu())
+    assert any(said in action.text() for action in menu.actions()), "it is listed"
+    assert player.events.isEnabled()
+    gap = next(flag for flag in player._in_order if flag.kind is FlagKind.GAP)
+    assert player.timeline.told(gap) == said, "its tip"
+    QTest.keyClick(player.timeline, Qt.Key.Key_N)
+    while archive.playback.position_ns < gap.at_ns:
+        before_ns = archive.playback.position_ns
+        QTest.keyClick(player.timeline, Qt.Key.Key_N)
+        assert archive.playback.position_ns > before_ns, "N leads there"
+    archive.playback.seek(tape.last_ns)
+    station = archive.playback.desk.stations[0]
+    shown.until(lambda: any(flag.kind is FlagKind.GAP for flag in station.flags), "it is in the plots")
+    assert set(FlagKind) == set(FLAGS) == set(FIRST), "each kind has its mark, and its rank"
+    marks = {(mark.shape, mark.colour) for mark in FLAGS.values()}
+    assert len(marks) == len(FLAGS), "no two look alike"

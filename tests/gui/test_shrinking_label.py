@@ -4,6 +4,7 @@ import pytest
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication
 
+from gateway.wire.parameter import ParameterValue
 from server_gui.views.overview.joint_table import (
     CURRENT,
     ERROR,
@@ -179,4 +180,20 @@ def test_what_is_shown_of_the_joint_table_is_whole_at_every_width(
     assert rules.halved_numbers(table, [table]) == []
     assert not table.isColumnHidden(STATE)
     assert not code or table.unsaid or not table.isColumnHidden(ERROR)
+    destroy(table)
+
+
+def test_a_torque_whose_limit_is_not_known_has_no_bar_to_explain(theme: Theme, bench: Bench) -> None:
+    bench.station.take([walking(10)])
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    table = JointTable(model, theme)
+    table.resize(1100, 300)
+    table.show()
+    assert not table.isColumnHidden(TORQUE)
+    assert TORQUE not in table.bars
+    limit = ParameterValue(80.0, "N·m", None, None, None)
+    bench.station.robot.parameters["left_knee.max_torque"] = limit
+    model.refresh()
+    assert TORQUE in table.bars
     destroy(table)

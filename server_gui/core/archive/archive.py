@@ -19,7 +19,7 @@ from server_gui.core.models.models import Models
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
-from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.edits import brief, unit_of
 
 WHO = "recordings"  # what the news name instead of a robot
 
@@ -110,7 +110,7 @@ class Archive:
         for name, value in session.parameters.items():
             if value is not None and name in si:
                 unit = unit_of(name, si[name], self._desk.shown.units)
-                said.append(f"{name} = {unit.editable(value)} {unit.symbol}".rstrip())
+                said.append(f"{name} = {brief(unit, value)} {unit.symbol}".rstrip())
             elif value is not None:
                 said.append(f"{name} = {value:g} (SI)")
         return said

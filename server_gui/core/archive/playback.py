@@ -282,9 +282,10 @@ class Playback:
         self._robot.judge()
 
     def _flags(self, rows: Rows) -> Iterator[Flag]:
-        """Yield the flags within these rows, on their clock."""
-        behind_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1])
-        for flag in self.happened.flags.between(int(rows.utc_ns[0]), int(rows.utc_ns[-1]) + 1):
+        """Yield the flags within these rows, or since those before, on their clock."""
+        behind_ns, before_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1]), self._robot.row_ns
+        begin_ns = int(rows.utc_ns[0]) if before_ns is None else before_ns + 1  # gaps have no rows
+        for flag in self.happened.flags.between(begin_ns, int(rows.utc_ns[-1]) + 1):
             if flag.kind not in (FlagKind.FAULT, FlagKind.STOP):  # these the rows tell themselves
                 yield replace(flag, at_ns=flag.at_ns + behind_ns)
 

@@ -9,6 +9,7 @@ from gateway.amounts import NONE
 
 LOOK_S: Final = 15.0  # between two looks at a store that was reached
 AGAIN_S: Final = 5.0  # before one that was away is tried again
+AGAIN: Final = "tried again by itself"  # as every page says it
 KNOWN_S: Final = 60.0  # after a look: longer than one of S3 that fails, later nobody knows
 
 
@@ -78,9 +79,9 @@ class StoreReach:
             Reach.NOT_LOOKED: "Looking for the first time …",
             Reach.REACHED: f"Reached; looked {self.age_s:.0f} s ago",
             Reach.EMPTY: f"There is no store at this URL yet (looked {self.age_s:.0f} s ago)",
-            Reach.AWAY: f"Not reached, tried again by itself: {self.problem or NONE}",
+            Reach.AWAY: f"Not reached, {AGAIN}: {self.problem or NONE}",
             Reach.UNREADABLE: f"Reached, but its list cannot be read: {self.list_problem or NONE}",
-            Reach.FAILING: f"An upload failed, tried again by itself: {self.upload_problem or NONE}",
+            Reach.FAILING: f"An upload failed, {AGAIN}: {self.upload_problem or NONE}",
             Reach.OLD: f"Not known: the newest answer came {self.age_s:.0f} s ago",
         }[self.state]
 

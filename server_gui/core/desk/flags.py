@@ -27,6 +27,8 @@ class FlagKind(Enum):
     TRIAL = "trial"
     MARK = "mark"
     DANGER = "danger"  # advice or worse is foreseen, or is over
+    GAP = "gap"  # of a recording: something of it is missing
+    CHANGE = "change"  # of what it was recorded with: a clock, a name, a model that was learned
     RULE = "rule"  # on predictions: it began or ceased to hold, or what came of its stop
     TRIGGER = "trigger"  # of the signals, and nowhere else
 
@@ -135,11 +137,10 @@ def of_recorded_journal(entries: Iterable[Entry]) -> Iterator[Flag]:
 
 
 def of_events(events: Iterable[Entry]) -> Iterator[Flag]:
-    """Yield what the events of a recording tell of robot and wearer, in UTC; others tell what is missing."""
+    """Yield what the events of a recording tell, in UTC; what is of no known kind tells what is missing."""
     for event in events:
-        kind = TOLD.get(str(event.get("kind")))
-        if kind is not None:
-            yield Flag(utc_ns(event["utc"]), str(event.get("text") or kind.value), kind)
+        kind = _TOLD.get(str(event.get("kind")), FlagKind.GAP)
+        yield Flag(utc_ns(event["utc"]), str(event.get("text") or kind.value), kind)
 
 
 def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
@@ -191,10 +192,13 @@ def _at(flag: Flag) -> int:
     return flag.at_ns
 
 
-TOLD: Final = {
+_TOLD: Final = {
     EventKind.MARKER.value: FlagKind.MARK,
     EventKind.DANGER.value: FlagKind.DANGER,
     EventKind.RULE.value: FlagKind.RULE,
+    EventKind.NAME.value: FlagKind.CHANGE,
+    EventKind.CLOCK_STEP.value: FlagKind.CHANGE,
+    EventKind.ADAPTED.value: FlagKind.CHANGE,
 }
 _HOW: Final = {FlagKind.FAULT: "fault", FlagKind.STOP: "quick stop"}
 _ENTRIES: Final = {

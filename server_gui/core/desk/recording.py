@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from gateway.amounts import size
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import Kind, check_of
-from server_gui.core.cloud.store_reach import StoreReach
+from server_gui.core.cloud.store_reach import AGAIN, StoreReach
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.follow.frame_time import now_ns
@@ -229,8 +229,15 @@ class Recording:
 
     def upload(self) -> None:
         """Bring what was recorded until now into the store."""
-        said = NewsKind.STATE, "what was recorded until now goes to the store"
-        self._ask(lambda keeper: keeper.upload(), lambda _: said)
+        self._ask(lambda keeper: keeper.upload(), lambda _: (NewsKind.STATE, self._uploading()))
+
+    def _uploading(self) -> str:
+        """Return what becomes of what was recorded until now, as far as the store is reached."""
+        if self.reach.problem is not None:
+            return f"what was recorded until now waits for the store: it is not reached, {AGAIN}"
+        if self.reach.upload_problem is not None:
+            return f"what was recorded until now waits for the store: an upload failed, {AGAIN}"
+        return "what was recorded until now goes to the store"
 
     @property
     def alarms(self) -> Alarms:

@@ -8,7 +8,7 @@ from ml.registry.card import Card
 from ml.registry.pointers import Pointer
 from ml.registry.registry import Registry
 from server_gui.core.models.catalogue import open_registry
-from server_gui.core.models.comparison import headline
+from server_gui.core.models.comparison import headline, unknown_to
 from server_gui.core.models.names import EVERY, model_names, task_name
 from server_gui.core.settings.promoters import UNSIGNED, desk_signature
 
@@ -36,6 +36,7 @@ class ModelChange:
     names: Mapping[str, str]  # of models by their ids
     is_signed: bool  # whether this desk has a key to sign it with
     is_anew: bool = False  # what serves unsigned is said again, signed
+    lost: str = ""  # which classes what serves now knows, and that model does not, in a sentence
     judged: str = ""  # what its training said of it, where this window knows
 
     @property
@@ -67,6 +68,8 @@ class ModelChange:
             return
         yield f"Serves now: {self._told(self.now)}."
         yield f"Will serve: {self._told(self.then)}."
+        if self.lost:
+            yield f"▲ {self.lost}"
         if self.judged:
             yield f"Training has judged it: {self.judged}"
         if self.then is None:
@@ -93,7 +96,9 @@ def promotion(url: str, model: str, robot: str) -> ModelChange:
     card = registry.promotable(model, robot)
     now = registry.serving(card.task, robot, set(card.channels))
     anew = _signs() and _serves_unsigned(registry, card, robot)
-    return ModelChange(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
+    lost = loss(registry, card, robot)
+    held = _card(registry, now)
+    return ModelChange(card.task, robot, held, card, False, _names(registry), _signs(), anew, lost)
 
 
 def way_back(url: str, task: str, robot: str) -> ModelChange:
@@ -108,7 +113,19 @@ def way_back(url: str, task: str, robot: str) -> ModelChange:
     before = registry.before(task, robot)
     now = registry.serving(task, robot)
     then = _card(registry, before)
-    return ModelChange(task, robot, _card(registry, now), then, True, _names(registry), _signs())
+    lost = "" if then is None else loss(registry, then, robot)
+    held = _card(registry, now)
+    return ModelChange(task, robot, held, then, True, _names(registry), _signs(), lost=lost)
+
+
+def loss(registry: Registry, then: Card, robot: str) -> str:
+    """Return which classes would be lost if this model served, in a sentence; "" where none is.
+
+    Where none was promoted, robots use what came with GWRMS; blocks.
+    """
+    now = registry.serving(then.task, robot)
+    shipped = (card for card in map(registry.card, registry.shipped()) if card.task == then.task)
+    return unknown_to(then, shipped if now is None else [registry.card(now)], "what serves now")
 
 
 def carry_out(url: str, change: ModelChange, who: str, why: str) -> Pointer:

@@ -1,7 +1,7 @@
 """One model beside another: figures, classes and wearers, each with which of the two is better."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -53,7 +53,9 @@ class Row:
 
     @property
     def difference(self) -> float | None:
-        """One less the other, in percent points."""
+        """One less the other, in percent points; none where these are figures of other sessions."""
+        if not self.is_verdict:
+            return None
         return None if self.one is None or self.other is None else self.one - self.other
 
     @property
@@ -63,10 +65,10 @@ class Row:
         That is for training to say where each was judged by sessions of its own.
         """
         difference = self.difference
+        if not self.is_verdict and self.one is not None and self.other is not None:
+            return OTHERS
         if difference is None:
             return ""
-        if not self.is_verdict:
-            return OTHERS
         if abs(difference) < ALIKE:
             return "alike"
         return "better" if (difference > 0) == self.more_is_better else "worse"
@@ -82,10 +84,21 @@ def rows(one: Card, other: Card | None) -> list[Row]:
 
 def notes(one: Entry, other: Entry | None) -> Iterator[str]:
     """Yield notes on such a comparison."""
+    if other is not None and (lost := unknown_to(one.card, [other.card], "the other")):
+        yield f"▲ {lost}"
     if other is not None and set(one.card.held_out) != set(other.card.held_out):
         yield "Each was judged on sessions of its own, so no verdict; training judges both on the same."
     if other is not None and (known := set(other.card.learned) & set(one.card.held_out)):
         yield f"{other.name} has learned from {counted(len(known), 'session')} that judged the other."
+
+
+def unknown_to(one: Card, others: Iterable[Card], whose: str) -> str:
+    """Return the classes that others know and this one does not, in a sentence; "" where there is none."""
+    known = dict.fromkeys(name for other in others for name in other.classes)
+    lost = [class_name(name) for name in known if name not in one.classes]
+    if not lost or not one.classes:
+        return ""
+    return f"It does not know {', '.join(lost)}; {whose} does. It calls these something else, or unknown."
 
 
 def last_week(entry: Entry) -> str:

@@ -65,6 +65,7 @@ class Batching:
         self.clock = Clock()
         self._link: int | None = None
         self._newest: dict[int, tuple[int, int, int]] = {}  # by stream: its newest `seq`, `dropped`, `shed`
+        self._rested: set[int] = set()  # streams of which nothing came since nobody wanted it recorded
         self._gathered: dict[Name, tuple[Layout, list[Timed]]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
@@ -81,6 +82,7 @@ class Batching:
 
         """
         batch, layout = new.batch, self.check(new)
+        self._go_on(new)
         before = (batch.seq - 1, batch.dropped, batch.shed)
         follows = batch.link == self._link and self._newest.get(new.stream) == before
         why = None if follows else self._why_new(new)
@@ -94,6 +96,18 @@ class Batching:
             name = (self.session, self.connection, new.stream, id(layout))
             self._gathered.setdefault(name, (layout, []))[1].append((batch, offset_ns))
         return events
+
+    def _go_on(self, new: Notification) -> None:
+        """Count the first notification of a stream after a rest as the one that follows."""
+        seq, _, shed = self._newest.get(new.stream, (-1, 0, 1))
+        if new.stream in self._rested and new.batch.link == self._link:
+            self._rested.discard(new.stream)
+            if new.batch.seq > seq:  # else its numbers began anew
+                self._newest[new.stream] = (new.batch.seq - 1, new.batch.dropped, shed)
+
+    def rest(self) -> None:
+        """Call nothing of what comes until the next `take` missing: nobody wants it recorded."""
+        self._rested = set(self._newest)
 
     def check(self, new: Notification) -> Layout:
         """Return how its rows are laid out; raises as `take` would, and changes nothing."""
@@ -153,7 +167,7 @@ class Batching:
         newest, dropped, shed = self._newest.get(new.stream, (batch.seq - batch.missed - 1, 0, 1))
         missed, rows = batch.seq - newest - 1, batch.dropped - dropped
         if missed:
-            happened(EventKind.GAP, f"{missed} notifications never came", missed=missed)
+            happened(EventKind.GAP, _missing(missed, batch.missed), missed=missed)
         if rows > 0:
             happened(
                 EventKind.DROPPED,
@@ -175,9 +189,11 @@ class Batching:
     def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:
         if self._link is not None:
             self.connection = uuid.uuid4().hex[:16]
-            happened(EventKind.GAP, f"{why}; what was in between has not been seen")
+            if not self._rested:
+                happened(EventKind.GAP, f"{why}; what was in between has not been seen")
         self._link = link
         self._newest.clear()
+        self._rested.clear()
 
     def _layout(self, channels: tuple[str, ...]) -> Layout:
         for channel in channels:
@@ -209,6 +225,18 @@ class Batching:
             utc_offset_ns=np.repeat(np.array([offset_ns for _, offset_ns in found], np.int64), counts),
             values=np.concatenate([_values(batch) for batch in batches], axis=1),
         )
+
+
+def _missing(missed: int, on_the_link: int) -> str:
+    """Return whose fault it is that notifications are missing: the window's header counts the link's."""
+    if on_the_link >= missed:
+        return f"{missed} notifications were lost on the link to the robot"
+    came = (
+        "all came"
+        if not on_the_link
+        else f"{on_the_link} were lost on the link to the robot, the others came"
+    )
+    return f"{missed} notifications were not recorded: {came}, but this computer was too busy to keep them"
 
 
 def _check(new: Notification) -> None:

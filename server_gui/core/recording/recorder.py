@@ -177,8 +177,8 @@ class Recorder:
         return self._put(robot, 1, functools.partial(self._robots.amend, robot, facts), control=True)
 
     def end(self, robot: str) -> int:
-        """End the robot's session."""
-        return self._put(robot, 1, functools.partial(self._robots.end, robot, Moment.now()), control=True)
+        """End the robot's session: nobody wants it recorded, until it begins again."""
+        return self._put(robot, 1, functools.partial(self._robots.rest, robot, Moment.now()), control=True)
 
     def leave(self, robot: str) -> int:
         """End the robot's session; it is followed no more."""

@@ -79,6 +79,11 @@ class Robots:
         session = self._sessions.pop(robot, None)
         return [] if session is None else [session.ended(known.clock.recorded_ns(now)).record()]
 
+    def rest(self, robot: str, now: Moment) -> list[Record]:
+        """End the robot's session because nobody wants it recorded: what comes until then is no gap."""
+        self.known(robot).rest()
+        return self.end(robot, now)
+
     def leave(self, robot: str, now: Moment) -> list[Record]:
         """End its session, and take it for one of those that are followed no more: its name is free."""
         self._names.pop(robot, None)

@@ -1,10 +1,11 @@
 """Edits that are staged and not sent: the difference to the robot, exactly as it would be written."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gateway.coding import Limit, broken_limit, coding_of
-from gateway.units import Unit, Units
+from gateway.units import Unit, Units, with_minus
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 
@@ -105,6 +106,19 @@ class Edits:
 def unit_of(name: str, si: str, units: Units) -> Unit:
     """Return the unit that a parameter `component.quantity` is shown in."""
     return units.unit(name.partition(".")[2], si)
+
+
+def brief(unit: Unit, value: float) -> str:
+    """Return four digits, and a decimal place more than its unit is read with, where they are not zeros.
+
+    Editing and tooltips have them all.
+    """
+    shown = value * unit.scale
+    if shown == 0.0 or not math.isfinite(shown):
+        return f"{abs(shown):g}"
+    places = max(unit.digits + 1, 3 - math.floor(math.log10(abs(shown))))
+    text = f"{shown:.{places}f}"
+    return with_minus(text.rstrip("0").rstrip(".") if "." in text else text)
 
 
 def refusal(value: float, old: Number | None, info: ParameterInfo | None, unit: Unit) -> str | None:

@@ -19,6 +19,7 @@ Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
 BREAK: Final = re.compile("[;,] ")  # between things to check
 SINCE: Final = "since "
+UNSEEN: Final = "as far as it is replayed: buses and computers are not"
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -38,7 +39,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
     if station.robot.is_recording:
-        return Mark("diamond", "accent"), "No alarm then", "in the recording, at this instant"
+        return Mark("diamond", "accent"), "No alarm then", UNSEEN
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
     if station.mark.colour in ("warn", "bad", "old"):  # as its card says

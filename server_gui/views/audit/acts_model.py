@@ -11,7 +11,8 @@ from gateway.plain_text import plain
 from gateway.units import Unit
 from gateway.wire.method import Number
 from server_gui.core.audit.acts import Act
-from server_gui.views.parameters.tree import brief, exact
+from server_gui.core.tuning.edits import brief
+from server_gui.views.parameters.tree import exact
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Index, RowsModel

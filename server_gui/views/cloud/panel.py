@@ -23,7 +23,7 @@ from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.actions import check, download, upload
 from server_gui.core.cloud.credentials import endpoint_told, keys_told
-from server_gui.core.cloud.store_reach import Reach
+from server_gui.core.cloud.store_reach import AGAIN, Reach
 from server_gui.core.desk.recording import Recording
 from server_gui.core.settings.server_file import default_file
 from server_gui.views.cloud.browser import Browser
@@ -35,10 +35,14 @@ from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.elided import PathLabel
 from server_gui.views.widgets.files import ask_folder
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: what is narrower has no room for two cards beside each other
+UPLOAD_NOW: Final = "Upload now"
+UPLOAD_HINT: Final = "Everything recorded so far, without waiting for a full batch"
+TRY: Final = "Try again now"
+TRY_HINT: Final = "Look for the store at once, and upload what waits if it is there"
 UPLOAD: Final = "Upload what waits"
 NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
@@ -79,9 +83,8 @@ class Cloud(QWidget):
         self.waiting = PlainLabel()
         self.waiting.setWordWrap(True)
         self.waiting.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.upload = QPushButton("Upload now")
+        self.upload = QPushButton(UPLOAD_NOW)
         self.upload.setObjectName("primary")
-        self.upload.setToolTip("Everything recorded so far, without waiting for a full batch")
         self.upload.clicked.connect(self._upload)
         self.spool = PathLabel("dim")
         self._cards["Waiting for upload"].body.addWidget(self.waiting, 1)
@@ -111,6 +114,8 @@ class Cloud(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._archive.library.look(now=True)
+        self._frame = 0
+        self.refresh()  # what was so when it was hidden is not shown for a moment
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -207,6 +212,10 @@ class Cloud(QWidget):
         report = self._recording.report
         busy = under_way([job for job in self._archive.jobs.jobs if job.name == UPLOAD])
         self.upload.setEnabled(not busy)
+        is_away = self._archive.library.reach.problem is not None
+        if self.upload.text() != (does := TRY if is_away else UPLOAD_NOW):
+            self.upload.setText(does)
+        set_tip(self.upload, TRY_HINT if is_away else UPLOAD_HINT)
         if report is None:
             self.spool.say("spool", str(self._archive.settings.recorder.spool))
             set_text(self.waiting, f"{self._recording.said(None).text}.")
@@ -219,13 +228,14 @@ class Cloud(QWidget):
             f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]
         if uploader.problem is not None:
-            lines.insert(0, f"▲ Retried automatically: {uploader.problem}")
+            lines.insert(0, f"▲ Not uploaded, {AGAIN}: {uploader.problem}")
         lines += [f"▲ {alarm.text}" for alarm in report.recorder.alarms]
         set_text(self.waiting, "\n".join(lines))
 
     # --- what people do
 
     def _upload(self) -> None:
+        self._archive.library.knock(now=True)  # a store that was away may be back
         if self._recording.can_ask:
             self._recording.upload()
         else:

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from server_gui.core.cloud.store_reach import Reach
+from server_gui.core.cloud.store_reach import AGAIN, Reach
 from server_gui.core.desk.desk import Desk
 from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.models import Models
@@ -32,8 +32,9 @@ EMPTY: Final = (
 PROMOTES: Final = "Let the selected model serve, after showing the change"
 ROLLS_BACK: Final = "Return to the previous model, after showing the change"
 UNREACHED: Final = "The store is not reached: nothing can be promoted or rolled back until it is"
-BEFORE: Final = "as known before"
-AWAY: Final = "▲ The store is not reached; retrying. Below is what was known before: {why}"
+SHORT: Final = "as known before"
+BEFORE: Final = "store not reached: as known before"
+AWAY: Final = f"▲ The store is not reached, {AGAIN}. Below is what was known before: {{why}}"
 
 
 class ModelsPage(QWidget):
@@ -73,6 +74,8 @@ class ModelsPage(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._models.knock()
+        self._frame = 0
+        self.refresh()  # what was so when it was hidden is not shown for a moment
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -205,4 +208,4 @@ class ModelsPage(QWidget):
         training_now = " · training" if self._models.is_training else ""
         known = "" if is_reached else f"{BEFORE} · "
         self._list.set_note(f"{known}{len(self._models.found.entries)} models{training_now}")
-        self.compare.set_note("" if is_reached else BEFORE)
+        self.compare.set_note("" if is_reached else BEFORE, "" if is_reached else SHORT)

@@ -137,6 +137,11 @@ class JointModel(QAbstractTableModel):
         return [(row[JOINT].text, row[ERROR].text) for row in self._cells if row[ERROR].tip]
 
     @property
+    def has_limit(self) -> bool:
+        """Whether the torque of some drive is limited, as far as is known."""
+        return any(row[TORQUE].bar is not None or " / " in row[TORQUE].text for row in self._cells)
+
+    @property
     def tone(self) -> str:
         """How bad the worst of it is."""
         return "bad" if any(row[ERROR].colour == "bad" for row in self._cells if row[ERROR].tip) else "warn"
@@ -267,8 +272,9 @@ class JointTable(QTableView):
 
     @property
     def bars(self) -> frozenset[int]:
-        """The columns with bars that are shown."""
-        return frozenset(column for column in (ANGLE, TORQUE) if not self.isColumnHidden(column))
+        """The columns with bars that are shown; without a known limit a torque has none."""
+        bars = {ANGLE} | ({TORQUE} if self._model.has_limit else set())
+        return frozenset(column for column in bars if not self.isColumnHidden(column))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -12,11 +12,10 @@ from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import refusal, unit_of
+from server_gui.core.tuning.edits import brief, refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.range_bar import RangeBar
 from server_gui.views.parameters.several_joints_menu import SeveralMenu
-from server_gui.views.parameters.tree import brief
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from gateway.units import Unit
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
-from server_gui.views.parameters.tree import brief
+from server_gui.core.tuning.edits import brief
 from server_gui.views.theme import Theme
 
 HIGH = 5.0  # pixels of the bar

@@ -1,6 +1,5 @@
 """The parameters by component: held, staged, unit, range, default, the file's, stored, what came of it."""
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
@@ -22,7 +21,7 @@ from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import refusal, unit_of
+from server_gui.core.tuning.edits import brief, refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
@@ -380,19 +379,6 @@ def range_text(least: Number | None, most: Number | None, unit: Unit) -> str:
     low = "" if least is None else with_minus(f"{least * unit.scale:.4g}")
     high = "" if most is None else with_minus(f"{most * unit.scale:.4g}")
     return f"{low} … {high}" if low or high else "–"
-
-
-def brief(unit: Unit, value: float) -> str:
-    """Return four digits, and a decimal place more than its unit is read with, where they are not zeros.
-
-    Editing and tooltips have them all.
-    """
-    shown = value * unit.scale
-    if shown == 0.0 or not math.isfinite(shown):
-        return f"{abs(shown):g}"
-    places = max(unit.digits + 1, 3 - math.floor(math.log10(abs(shown))))
-    text = f"{shown:.{places}f}"
-    return with_minus(text.rstrip("0").rstrip(".") if "." in text else text)
 
 
 def exact(unit: Unit, value: float | None) -> str:

@@ -56,7 +56,7 @@ class BesideBar(QWidget):
             said = "reading …"
         else:
             said = f"{tape.session.robot}, {day_text(tape.first_ns)}, aligned by"
-        set_text(self.said, "\n".join(filter(None, (f"┅ dashed: {said}", self._refused))))
+        set_text(self.said, "\n".join(filter(None, (f"┅ thin, dashed: {said}", self._refused))))
         self.by.setEnabled(tape is not None)
         if self.by.currentText() != beside.by.value and not self.by.view().isVisible():
             self.by.setCurrentText(beside.by.value)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -37,6 +37,7 @@ from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
@@ -45,7 +46,13 @@ from server_gui.views.workspace.page import AROUND_S, Signals
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
 EVENTS_HINT: Final = "Its events; choose one to see its instant"
-NO_EVENTS_HINT: Final = "Nothing happened in it: no mark, no change of a drive, no line of the journal"
+NO_EVENTS_HINT: Final = (
+    "Nothing happened in it: no gap, no mark, no change of a drive, no line of the journal"
+)
+NOT_REPLAYED: Final = "· without alarms of buses and computers"
+NOT_REPLAYED_HINT: Final = (
+    "What is replayed are the robot's signals: what its buses or computers lacked then does not show"
+)
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SLOW: Final = 5  # frames between two looks at what people read
 SIGNALS: Final = 1  # of the two views
@@ -223,6 +230,10 @@ class Player(QWidget):
         self._speed.setAccessibleName("Speed of the playback")
         self._speed.currentIndexChanged.connect(self._set_speed)
         self.place = PlainLabel()
+        self.unseen = ElidedLabel("dim", Qt.TextElideMode.ElideRight)
+        self.unseen.setText(NOT_REPLAYED)
+        self.unseen.setAccessibleName(NOT_REPLAYED)
+        set_tip(self.unseen, NOT_REPLAYED_HINT)
         self.export = QPushButton("Export")
         menu = QMenu(self.export)
         for kind in FORMATS:
@@ -237,7 +248,7 @@ class Player(QWidget):
         row = QHBoxLayout()
         for widget in (self.play, self._speed, self.events, self.place):
             row.addWidget(widget)
-        row.addStretch(1)
+        row.addWidget(self.unseen, 1)
         self.labelling = QPushButton("Labels")
         self.labelling.setCheckable(True)
         self.labelling.setChecked(True)

@@ -1,11 +1,12 @@
 """Every recorded session, newest first: what is known of it, what happened in it; to be played."""
 
-from collections.abc import Mapping, Sequence
-from datetime import datetime
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any, Final
 
 from PySide6.QtCore import QRect, Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -20,10 +21,11 @@ from PySide6.QtWidgets import (
 
 from gateway.amounts import size
 from gateway.plain_text import plain
-from ml.store.labels import utc_ns
 from ml.store.sessions import UNREAD, Session
 from server_gui.core.archive.archive import Archive
+from server_gui.core.cloud.store_reach import AGAIN
 from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.flags import Flag, of_events
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
@@ -37,6 +39,7 @@ TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator"
 BEGAN, ROBOT, LENGTH, ROWS, SIZE, STATE, OPERATOR, NOTES = range(len(TITLES))
 NUMBERS: Final = frozenset({LENGTH, ROWS, SIZE})
 NAMES: Final = {NOTES: 140, ROBOT: 60, OPERATOR: 60, STATE: 60}  # wide at least, at text of 100 %
+STAMP: Final = re.compile(r"\d{8}T\d{6}Z")  # begins a session's name
 SPARE: Final = (ROWS, SIZE, STATE, OPERATOR, NOTES)  # left out in this order where there is less room
 EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
@@ -47,6 +50,9 @@ LINES: Final = 6  # of notes, at most
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
 PARTIAL: Final = "only what is still on this computer; the store is not reached"
+OTHERS: Final = "others may be in the store"
+GOES_ON: Final = "goes on"
+NOW: Final = "recorded now"
 NOT_KNOWN: Final = "not known while the store is not reached"
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
 TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
@@ -59,12 +65,20 @@ class SessionModel(RowsModel[Session]):
     def __init__(self, theme: Theme) -> None:
         super().__init__(TITLES, lambda session: (session.robot, session.session), NUMBERS | {0})
         self._theme = theme
+        self.recorded: frozenset[str] = frozenset()  # the sessions that are recorded now
+
+    def show_recorded(self, recorded: frozenset[str]) -> None:
+        """Show that these are recorded now."""
+        if recorded != self.recorded:
+            self.recorded = recorded
+            last = self.index(max(self.rowCount() - 1, 0), len(TITLES) - 1)
+            self.dataChanged.emit(self.index(0, 0), last)
 
     def data(self, index: Index, role: int = 0) -> Any:
         session, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return plain(_cells(session)[column])
+                return plain(_cells(session, is_now=session.session in self.recorded)[column])
             case _ if role == SORT_ROLE:
                 return _keys(session)[column]
             case Qt.ItemDataRole.ToolTipRole:
@@ -171,6 +185,10 @@ class SessionsPage(QWidget):
         theme.changed.connect(self._restyle)
         self._restyle()
 
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.refresh()  # what was so when it was hidden is not shown for a moment
+
     def refresh(self) -> None:
         """Look again where it is time, and show what there is."""
         library = self._archive.library
@@ -178,14 +196,23 @@ class SessionsPage(QWidget):
         if library.revision != self._revision:
             self._revision = library.revision
             self.sessions.take(library.found.sessions)
+        self._show_recorded()
         set_text(self.said, self._state())
         self.said.setVisible(bool(self.said.text()))
         count = len(library.found.sessions)
         counted = "1 session" if count == 1 else f"{count} sessions"
-        self._list.set_note(counted if library.revision else "looking …")
+        is_whole = library.reach.problem is None and library.reach.list_problem is None
+        wordings = (counted,) if is_whole else (f"{counted} known; {OTHERS}", f"{counted} known")
+        self._list.set_note(*(wordings if library.revision else ("looking …",)))
         self.mark.setEnabled(self._recording.can_ask)
         self._refresh_compare()
         self._refresh_details()
+
+    def _show_recorded(self) -> None:
+        """Show which are recorded now, as whoever records says."""
+        report = self._recording.report
+        links = {} if report is None or report.is_paused else report.robots
+        self.sessions.show_recorded(frozenset(link.session for link in links.values() if link.session))
 
     @property
     def chosen(self) -> Session | None:
@@ -215,20 +242,21 @@ class SessionsPage(QWidget):
     def _state(self) -> str:
         library = self._archive.library
         if library.reach.problem is not None:
-            return f"The store is not reached; retrying: {library.reach.problem}"
+            return f"The store is not reached, {AGAIN}: {library.reach.problem}"
         if library.reach.list_problem is not None:
-            return f"The store's list cannot be read; retrying: {library.reach.list_problem}"
+            return f"The store's list cannot be read, {AGAIN}: {library.reach.list_problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
         archive, session = self._archive, self.chosen
         self.play.setEnabled(archive.tape is not None)
-        known = (session, archive.tape, archive.problem, archive.shown_units)
+        is_now = session is not None and session.session in self.sessions.recorded
+        known = (session, archive.tape, archive.problem, archive.shown_units, is_now)
         if known != self._told:
             self._told = known
             self._card.set_title("Recording" if session is None else session.session)
             held = [] if session is None else archive.held_then(session)
-            self.details.setPlainText(facts_text(session, archive.tape, archive.problem, held))
+            self.details.setPlainText(facts_text(session, archive.tape, archive.problem, held, is_now=is_now))
 
     # --- how it is put together
 
@@ -264,21 +292,34 @@ class SessionsPage(QWidget):
         self.details.setMinimumWidth(self._theme.px(120))
 
 
-def _cells(session: Session) -> tuple[str, ...]:
+def _cells(session: Session, *, is_now: bool = False) -> tuple[str, ...]:
+    length = clock_text(session.length.total_seconds()) if session.rows else "–"
     return (
-        _when(session.began or session.first),
+        _when(_began(session)),
         session.robot,
-        clock_text(session.length.total_seconds()) if session.rows else "–",
+        GOES_ON if is_now else length,
         f"{session.rows:,}" if session.rows else "–",
         size(session.size_bytes) if session.rows else "–",
-        _state(session),
+        NOW if is_now else _state(session),
         session.operator,
         session.notes,
     )
 
 
+def _began(session: Session) -> datetime | None:
+    """Return when it began; of one that is in a store out of reach, by its name."""
+    known = session.began or session.first
+    stamp = session.session.partition("-")[0]
+    if known is not None or not STAMP.fullmatch(stamp):
+        return known
+    try:
+        return datetime.strptime(stamp, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    except ValueError:
+        return None
+
+
 def _keys(session: Session) -> tuple[Any, ...]:
-    began = session.began or session.first
+    began = _began(session)
     cells = _cells(session)
     numbers = (session.length.total_seconds(), session.rows, session.size_bytes)
     return (0.0 if began is None else began.timestamp(), cells[1], *numbers, *cells[5:])
@@ -294,22 +335,20 @@ def _when(time: datetime | None) -> str:
     return "–" if time is None else f"{time.astimezone():%Y-%m-%d %H:%M:%S}"
 
 
-def facts_text(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
-    """Return the facts of a session as text."""
+def facts_text(
+    session: Session | None, tape: Tape | None, problem: str, held: Sequence[str], *, is_now: bool = False
+) -> str:
+    """Return the facts of a session as text; `is_now`: it is recorded now."""
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     away = session.notes == UNREAD or (tape is not None and tape.is_partial)
     known = {
         "Session": session.session,
         "Robot": session.robot,
-        "Began": NOT_KNOWN if away and session.began is None else _when(session.began),
-        "Ended": "it is still running, or its server was killed"
-        if session.ended is None
-        else _when(session.ended),
-        "Length": NOT_KNOWN
-        if away and not session.rows
-        else f"{_cells(session)[LENGTH]}, {_cells(session)[ROWS]} rows, {_cells(session)[SIZE]}",
-        "State": _state(session),
+        "Began": NOT_KNOWN if away and _began(session) is None else _when(_began(session)),
+        "Ended": _ended(session, is_now=is_now),
+        "Length": _length(session, away=away, is_now=is_now),
+        "State": "" if is_now else _state(session),
         "Operator": session.operator,
         "Notes": session.notes,
         "Software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),
@@ -320,20 +359,39 @@ def facts_text(session: Session | None, tape: Tape | None, problem: str, held: S
     elif tape is None:
         lines += ["", "looking into it …"]
     else:
-        lines += ["", *_inside(tape, is_partial=away)]
+        lines += ["", *_inside(tape, is_partial=away, is_now=is_now)]
     return "\n".join([*lines, *(["", "Parameters when it began:", *held] if held else [])])
 
 
-def _inside(tape: Tape, *, is_partial: bool) -> list[str]:
+def _ended(session: Session, *, is_now: bool) -> str:
+    if session.ended is not None:
+        return _when(session.ended)
+    return "not yet: it is recorded now" if is_now else "not known: its server was killed, or goes on"
+
+
+def _length(session: Session, *, away: bool, is_now: bool) -> str:
+    """Return how long it is; of one that is recorded now the header says it, and here is what is kept."""
+    if is_now and not session.rows:
+        return f"it {GOES_ON}"
+    if away and not session.rows:
+        return NOT_KNOWN
+    length, rows, size_ = (_cells(session)[column] for column in (LENGTH, ROWS, SIZE))
+    return f"it {GOES_ON}; kept so far: {rows} rows, {size_}" if is_now else f"{length}, {rows} rows, {size_}"
+
+
+def _inside(tape: Tape, *, is_partial: bool, is_now: bool) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
     head = f"{length} of {len(tape.units)} channels"
+    if is_now:
+        head = f"Its first {length} can be played by now, {len(tape.units)} channels"
     if is_partial:
         head = f"{head}: {PARTIAL}"
     if not tape.events:
         return [head] if is_partial else [head, "It has no gaps and no marks."]
-    return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
+    return [head, "", *(_event(tape, flag) for flag in of_events(tape.events[:EVENTS_TOLD]))]
 
 
-def _event(tape: Tape, row: Mapping[str, Any]) -> str:
-    at = clock_text(max(utc_ns(row["utc"]) - tape.first_ns, 0) / SECOND_NS, 1)
-    return f"{at}  {'◆' if row['kind'] == 'marker' else '▲'} {row['kind']}: {row['text']}"
+def _event(tape: Tape, flag: Flag) -> str:
+    """Return what happened when, in the words of the time axis."""
+    at = clock_text(max(flag.at_ns - tape.first_ns, 0) / SECOND_NS, 1)
+    return f"{at}  {flag.kind.value}: {flag.text}"

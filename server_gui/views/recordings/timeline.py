@@ -9,10 +9,10 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QBrush, QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from ml.store.labels import Label, utc_ns
+from ml.store.labels import Label
 from server_gui.core.archive.outline import Outline
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.desk.flags import TOLD, Flag
+from server_gui.core.desk.flags import Flag
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.cursors import FLAGS
@@ -31,7 +31,6 @@ HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99",
 BAR: Final = 40  # high, at text of 100 %
 LABELLED: Final = 0.42  # of which labels take so much, at its bottom
 DASHED: Final = "┅ "  # begins what is of the recording beside
-MISSING: Final = Mark("triangle", "warn", "something is missing")
 
 
 TIP: Final = (
@@ -185,9 +184,6 @@ class Timeline(QWidget):
         painter.setPen(self._theme.colour("accent" if self.hasFocus() else "border"))
         painter.drawRect(bar)
         self._draw_ticks(painter, bar)
-        for happened in self._tape.events:
-            if happened["kind"] not in TOLD:
-                self._draw_mark(painter, bar, MISSING, utc_ns(happened["utc"]))
         self._draw_beside(painter, bar)
         for flag in self._flags:
             self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)

@@ -21,6 +21,8 @@ FLAGS: Final = {
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
     FlagKind.DANGER: Mark("triangle", "warn", "danger"),
     FlagKind.RULE: Mark("half", "warn", "rule"),
+    FlagKind.GAP: Mark("cross", "warn", "gap"),
+    FlagKind.CHANGE: Mark("square", "dim", "change"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
     FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }
@@ -29,10 +31,12 @@ FIRST: Final = (
     FlagKind.STOP,
     FlagKind.DANGER,
     FlagKind.RULE,
+    FlagKind.GAP,
     FlagKind.MARK,
     FlagKind.TRIAL,
     FlagKind.WRITE,
     FlagKind.TRIGGER,
+    FlagKind.CHANGE,
 )
 
 

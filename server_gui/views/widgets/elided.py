@@ -3,12 +3,16 @@
 Numbers alone are for `ShrinkingLabel`.
 """
 
+from typing import Final
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.rows import Index
+
+LONG: Final = 16  # letters of a word that is an address or a path
 
 
 class ElidedLabel(PlainLabel):
@@ -78,10 +82,19 @@ class WrappingDelegate(QStyledItemDelegate):
 
 
 def whole_words(text: str, metrics: QFontMetrics, room: int) -> str:
-    """Return all of it, or as many of its words as have room (pixels) with … behind, the first at least."""
+    """Return all of it, or as many of its words as have room (pixels) with … behind, the first at least.
+
+    An address or a path, which no word follows within the room, is cut itself.
+    """
     if metrics.horizontalAdvance(text) <= room:
         return text
     words = text.split(" ")
-    while len(words) > 1 and metrics.horizontalAdvance(f"{' '.join(words)} …") > room:
-        words.pop()
-    return f"{' '.join(words)} …"
+    kept = len(words)
+    while kept > 1 and metrics.horizontalAdvance(f"{' '.join(words[:kept])} …") > room:
+        kept -= 1
+    whole = f"{' '.join(words[:kept])} …"
+    cut = words[0] if metrics.horizontalAdvance(whole) > room else "".join(words[kept : kept + 1])
+    if len(cut) < LONG:
+        return whole
+    shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+    return shown if len(shown) > len(whole) or metrics.horizontalAdvance(whole) > room else whole

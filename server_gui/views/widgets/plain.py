@@ -1,12 +1,14 @@
 """Labels and tool tips that show a name as it is: Qt takes whatever looks like HTML for HTML, unless told."""
 
 import html
-from typing import Protocol
+from typing import Final, Protocol
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
 from gateway.plain_text import plain
+
+KEPT: Final = "\n\u00a0"  # a line ends, and a number stays with its unit: neither commands anything
 
 
 class PlainLabel(QLabel):
@@ -18,7 +20,7 @@ class PlainLabel(QLabel):
         self.setText(text)
 
     def setText(self, text: str) -> None:
-        super().setText(plain(text, "\n"))
+        super().setText(plain(text, KEPT))
 
 
 class Tipped(Protocol):
@@ -40,7 +42,7 @@ def rich(text: str) -> str:
 
 def tip(text: str) -> str:
     """Text for a tool tip, which is shown as it is also where it looks like HTML."""
-    shown = plain(text, "\n")
+    shown = plain(text, KEPT)
     if "<" not in shown:  # then Qt does not take it for HTML
         return shown
     return f'<p style="white-space:pre-wrap">{html.escape(shown)}</p>'

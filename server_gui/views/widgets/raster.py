@@ -38,7 +38,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Inks:
-    """A colour (0xAARRGGBB) a curve, which of them are dashed, and what is behind them."""
+    """A colour (0xAARRGGBB) a curve, which are dashed (then others are bold), and what is behind them."""
 
     colours: tuple[int, ...] = ()
     dashed: tuple[bool, ...] = ()
@@ -107,13 +107,31 @@ class Strip:
         before[np.isnan(values[:, starts])] = np.nan  # it ended there
         unknown = np.isnan(low)
         low, high = np.fmin(low, before), np.fmax(high, before)
+        bold = _bold(inks, len(curves))
+        _widen(low, high, columns[starts], bold)
         seen = ~unknown & (high >= view.low) & (low <= view.high) & (columns[starts] >= first)
         if any(inks.dashed):
             seen &= ~np.array(inks.dashed)[:, None] | (columns[starts] // DASH % 2 == 0)
         curve, column = np.nonzero(seen)
         top, bottom = _rows(high[seen], view), _rows(low[seen], view)
+        bottom = np.minimum(bottom + bold[curve], view.height - 1)
         ink = np.array(inks.colours, np.uint32)[curve]
         fill(self.pixels, columns[starts][column] % view.width, top, bottom, ink)
+
+
+def _bold(inks: Inks, count: int) -> npt.NDArray[np.bool_]:
+    """Return which curves are two pixels thick: those beside dashed ones, which are one."""
+    return ~np.array(inks.dashed, np.bool_) if any(inks.dashed) else np.zeros(count, np.bool_)
+
+
+def _widen(low: Floats, high: Floats, columns: Places, bold: npt.NDArray[np.bool_]) -> None:
+    """Let each column of a bold curve cover what the one before it covers."""
+    if not bold.any():
+        return
+    joined = np.diff(columns) == 1
+    for edge, join in ((low, np.fmin), (high, np.fmax)):
+        thick = edge[bold]
+        edge[bold, 1:] = np.where(joined, join(thick[:, 1:], thick[:, :-1]), thick[:, 1:])
 
 
 def samples(times: Floats, values: Floats, scale: float, *, begins: bool) -> tuple[Floats, Floats]:

@@ -153,12 +153,12 @@ def side_by_side(bench: Bench) -> None:
     hand.click(today)
     x, y = hand.where(today, 1)
     hand.xdotool("mousemove", str(x), str(y), "keydown", "ctrl", "click", "1", "keyup", "ctrl")
-    hand.insist("Side by side", lambda: hand.reads("┅ dashed"), exactly=True)
-    hand.sees("┅ dashed", "aligned by", within_s=AGAIN_S)
+    hand.insist("Side by side", lambda: hand.reads("┅ thin, dashed"), exactly=True)
+    hand.sees("┅ thin, dashed", "aligned by", within_s=AGAIN_S)
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("side-by-side")
     hand.click("Close the second recording")
-    hand.misses("┅ dashed")
+    hand.misses("┅ thin, dashed")
     hand.click("← All")
 
 
@@ -206,7 +206,10 @@ def store_gone(bench: Bench) -> None:
     hand.click("Upload now")
     hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
-    for title, key, words in (("models", "alt+m", "Train a model"), ("recordings", "alt+c", "retrying")):
+    for title, key, words in (
+        ("models", "alt+m", "Train a model"),
+        ("recordings", "alt+c", "others may be in"),
+    ):
         hand.key(key)
         hand.sees(words)
         hand.keep(f"store-gone-{title}")

@@ -4,6 +4,7 @@ import collections
 import contextlib
 import csv
 import sqlite3
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -111,7 +112,8 @@ def test_while_the_store_is_away_the_rest_of_a_session_is_not_called_lost(
     tape = Tape.open(settings, shown)
     assert tape.is_partial
     said = facts_text(shown, tape, "", ())
-    assert "Began: not known while the store is not reached" in said
+    began = datetime.strptime(name.partition("-")[0], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    assert f"Began: {began.astimezone():%Y-%m-%d %H:%M:%S}" in said, "its name tells"
     assert "Length: not known while the store is not reached" in said
     assert "only what is still on this computer; the store is not reached" in said
     assert "no gaps" not in said

@@ -103,13 +103,18 @@ def test_a_fault_is_flagged_with_the_code_that_its_drive_tells_soon() -> None:
     assert "left knee, right knee: fault" in {flag.text for flag in late}
 
 
-def test_marks_and_rules_of_a_recording_are_flags() -> None:
+def test_every_event_of_a_recording_is_a_flag_also_what_is_missing_in_it() -> None:
     at = datetime.datetime(2026, 11, 23, tzinfo=datetime.UTC)
-    texts = {"marker": "turns", "gap": "", "rule": "rule fall (stop) holds"}
-    events = [{"kind": kind, "utc": at, "text": text} for kind, text in texts.items()]
+    kinds = {"marker": "turns", "gap": "the link was made again", "rule": "rule fall (stop) holds"}
+    kinds |= {"clock_step": "this server's clock was set", "unheard_of": "", "dropped": "12 rows"}
+    events = [{"kind": kind, "utc": at, "text": text} for kind, text in kinds.items()]
     assert [(flag.text, flag.kind) for flag in of_events(events)] == [
         ("turns", FlagKind.MARK),
+        ("the link was made again", FlagKind.GAP),
         ("rule fall (stop) holds", FlagKind.RULE),
+        ("this server's clock was set", FlagKind.CHANGE),
+        ("gap", FlagKind.GAP),
+        ("12 rows", FlagKind.GAP),
     ]
 
 

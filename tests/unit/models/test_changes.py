@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from ml.errors import Overtaken, UnusableModel
@@ -201,3 +202,28 @@ def test_a_registry_of_a_folder_that_is_given_must_be_there(tmp_path: Path) -> N
     with pytest.raises(StoreError, match="there is no store at"):
         open_registry(nowhere)
     assert not (tmp_path / "typo").exists()
+
+
+def test_a_promotion_names_the_classes_that_what_serves_knows_and_the_new_one_does_not(
+    registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = publish(registry), publish(registry, 1)
+    registry.promote(one.id, who="Ada", why="")
+    known = Registry.card
+    wider = msgspec.structs.replace(one, classes=(*one.classes, "sit_to_stand", "stairs"))
+    monkeypatch.setattr(Registry, "card", lambda self, it: wider if it == one.id else known(self, it))
+    said = "▲ It does not know sit to stand, stairs; what serves now does."
+    assert any(sentence.startswith(said) for sentence in promotion(registry.url, other.id, "").sentences)
+    registry.promote(other.id, who="Ada", why="")
+    assert not any("does not know" in each for each in way_back(registry.url, "falling", "").sentences)
+
+
+def test_where_none_was_promoted_classes_of_what_came_with_gwrms_are_lost(
+    registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, came = publish(registry), publish(registry, 1)
+    known = Registry.card
+    wider = msgspec.structs.replace(came, classes=(*came.classes, "stairs"))
+    monkeypatch.setattr(Registry, "shipped", lambda _: frozenset({came.id}))
+    monkeypatch.setattr(Registry, "card", lambda self, it: wider if it == came.id else known(self, it))
+    assert "does not know stairs" in " ".join(promotion(registry.url, one.id, "").sentences)

@@ -106,13 +106,22 @@ def test_judges_that_differ_or_are_known_already_are_pointed_out() -> None:
     assert list(notes(one, entry("activity-1", held_out=("mon",)))) == []
 
 
-def test_points_of_models_that_were_judged_by_other_sessions_are_no_verdict() -> None:
+def test_figures_that_were_judged_by_other_sessions_have_no_difference_and_no_verdict() -> None:
     one, other = (
         card(metrics=judged(f1, f1), held_out=(session,)) for f1, session in ((0.939, "mon"), (0.971, "tue"))
     )
     known = {row.name: row for row in rows(one, other)}
-    assert signed(known["F1, mean over classes"].difference) == "−3.2"
-    assert {row.verdict for row in known.values() if row.difference is not None} == {"other sessions"}
+    assert signed(known["F1, mean over classes"].difference) == "–"
+    assert known["F1, mean over classes"].verdict == "other sessions"
+    assert {row.difference for row in known.values()} == {None}
+    assert known["fall"].verdict == "", "neither has a figure"
+
+
+def test_classes_that_only_the_other_knows_are_named() -> None:
+    one, other = entry(), entry("activity-1", classes=("stand", "walk", "sit_to_stand", "turn"))
+    said = "▲ It does not know sit to stand, turn; the other does."
+    assert [note[: len(said)] for note in notes(one, other)] == [said]
+    assert list(notes(other, one)) == [], "it knows all that the other knows"
 
 
 @pytest.mark.parametrize(

@@ -329,3 +329,31 @@ def test_a_prediction_has_the_utc_of_the_rows_of_its_own_session(spool: Spool) -
     rows_ns = {run.session: int(run.stamps_ns[0] + run.utc_offset_ns[0]) for run in runs}
     said_ns = {each.fields["session"]: each.fields["utc"] for each in records if each.table == "predictions"}
     assert said_ns == {**rows_ns, "another": 7}
+
+
+def test_a_gap_says_whether_the_link_or_this_computer_has_lost_it(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for each in (batch(0), batch(4, missed=3), batch(8), batch(14, missed=2)):
+            recorder.record("exo-01", 1, each)
+    came = "but this computer was too busy to keep them"
+    assert [event["text"] for event in events(spool, "gap")] == [
+        "3 notifications were lost on the link to the robot",
+        f"3 notifications were not recorded: all came, {came}",
+        f"5 notifications were not recorded: 2 were lost on the link to the robot, the others came, {came}",
+    ]
+
+
+def test_what_comes_while_nobody_wants_it_recorded_is_no_gap(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for seq in (0, 400):
+            recorder.begin("exo-01", Facts())
+            for stream in (1, 2):
+                recorder.record("exo-01", stream, batch(seq, dropped=seq))
+            recorder.end("exo-01")
+        recorder.begin("exo-01", Facts())
+        recorder.record("exo-01", 1, batch(0, link=2))
+        assert recorder.flush(WAIT_S)
+        assert events(spool, "gap", "dropped") == [], "of what was not wanted"
+        recorder.record("exo-01", 1, batch(3, missed=2, link=2))
+    (gap,) = events(spool, "gap")
+    assert json.loads(str(gap["data"]))["missed"] == 2

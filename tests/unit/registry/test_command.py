@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -177,3 +178,15 @@ def test_a_model_is_exported(desk: Desk, tmp_path: Path) -> None:
 
     rows, _ = features(seed=3)
     assert differs(learned(), file.read_bytes(), rows) < 1e-5
+
+
+def test_a_promotion_warns_of_classes_that_are_lost(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, other = desk.publish(), desk.publish(1)
+    desk.run("promote", one.id)
+    known = Registry.card
+    wider = msgspec.structs.replace(one, classes=(*one.classes, "sit_to_stand"))
+    monkeypatch.setattr(Registry, "card", lambda self, it: wider if it == one.id else known(self, it))
+    assert main(["models", "promote", other.id, *desk.where]) == 0
+    assert "It does not know sit to stand; what serves now does." in capsys.readouterr().err
