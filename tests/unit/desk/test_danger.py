@@ -120,7 +120,8 @@ def test_a_recording_keeps_it_as_events_which_are_shown_again() -> None:
     one._keep([endangered(Level.NONE), endangered(Level.ADVICE), endangered(Level.ADVICE)])
     one._keep([endangered(Level.NONE)])
     assert [(event["robot"], event["level"]) for event in kept] == [(ROBOT, "advice"), (ROBOT, "none")]
-    assert [flag.kind for flag in of_events([*kept, {"kind": "gap", "utc": NOW}])] == [FlagKind.DANGER] * 2
+    gap = {"kind": "gap", "text": "12 notifications were lost", "utc": NOW}
+    assert [flag.kind for flag in of_events([*kept, gap])] == [FlagKind.DANGER] * 2 + [FlagKind.GAP]
 
 
 def test_the_terminal_says_the_level_and_that_it_is_not_known_and_nothing_where_it_is_off() -> None:
