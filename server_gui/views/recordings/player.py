@@ -196,10 +196,8 @@ class Player(QWidget):
             scene.align = Align.NOW
             self._is_beside_new = True
         elif self._is_beside_new and self.signals.cards:
-            self._is_beside_new = False
-            bring_into_sight(
-                self.signals.cards[0], first=True
-            )  # tools and channels may take all of a small screen
+            self._is_beside_new = False  # tools and channels may take all of a small screen
+            bring_into_sight(self.signals.cards[0], first=True)
 
     # --- how it is put together
 
