@@ -13,8 +13,8 @@ from gateway.wire.stop import Reset
 EPILOG = """Each drive is taken to "switch on disabled": a moving one is stopped first, a fault is reset, and
 one that held its position releases it. Nothing is enabled: the controller or gwrms enable does
 that. The stop stays held until every drive is known to be without current, and every controller
-to be stopped; otherwise the reason is named. Where no stop is held and drives are under power, the command
-asks first: they lose their power."""
+to be stopped; otherwise the reason is named. Where no stop is held and drives are under power, or one's
+state is not known, the command asks first: they lose their power."""
 LOSES = "no stop is held, and under power are: {}. A reset stops them and takes their power. Go on?"
 POWERED = frozenset({"switched on", "operation enabled", "quick stop active", "fault reaction active"})
 
@@ -43,7 +43,7 @@ def main(argv: list[str]) -> int:
 
 
 def _powered(robot: Robot) -> list[str]:
-    """Return the drives that may hold their joint while no stop is held; none where that is not known.
+    """Return the drives that may hold their joint while no stop is held; none where the robot does not tell.
 
     Then it is reset all the same: a reset enables nothing, and a fault has to be cleared.
     """
@@ -57,7 +57,8 @@ def _with_power(robot: Robot, description: Description) -> list[str]:
     joints = {one.name for one in description.components if one.kind == "joint"}
     states = [one for one in description.channels if one.component in joints and one.quantity == "state"]
     values = robot.components(*(one.name for one in states)).values if states else {}
-    return [one.component for one in states if _word(one, values.get(one.name)) in POWERED]
+    found = ((one.component, _word(one, values.get(one.name))) for one in states)
+    return [name if word else f"{name} (not known)" for name, word in found if not word or word in POWERED]
 
 
 def _word(channel: ChannelInfo, value: float | None) -> str | None:

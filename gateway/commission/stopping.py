@@ -24,6 +24,7 @@ from gateway.commission.draft import Draft
 
 WITHIN_S = 1.5  # for a drive to confirm it
 MOST_AXES = 8  # of a node (CiA 402-2)
+OTHERS = "the draft tells of no drive: others than those of the robot's file may be on the bus"
 EVERY_NODE = range(1, 128)
 
 
@@ -41,11 +42,11 @@ class Stopped:
     """Result of a stop by drive; of no drives while none is known."""
 
     drives: Mapping[str, StopOutcome]
-    problem: str = ""  # of the bus
+    problem: str = ""  # of the bus, or why there may be other drives
 
     @property
     def confirmed(self) -> bool:
-        return bool(self.drives) and set(self.drives.values()) == {StopOutcome.CONFIRMED}
+        return bool(self.drives) and not self.problem and not self._missing
 
     @property
     def words(self) -> str:
@@ -55,12 +56,15 @@ class Stopped:
             return "NOT CONFIRMED: no drive is known yet; all 127 node ids were asked to stop"
         if self.confirmed:
             return f"STOP is confirmed by {', '.join(self.drives)}"
-        missing = [
-            f"{axis} is {outcome}"
-            for axis, outcome in self.drives.items()
-            if outcome != StopOutcome.CONFIRMED
-        ]
-        return f"NOT CONFIRMED: {', '.join(missing)}" + (f" ({self.problem})" if self.problem else "")
+        missing = ", ".join(self._missing)
+        if not missing:
+            return f"NOT CONFIRMED: {self.problem}; only {', '.join(self.drives)} confirmed it"
+        return f"NOT CONFIRMED: {missing}" + (f" ({self.problem})" if self.problem else "")
+
+    @property
+    def _missing(self) -> list[str]:
+        said = self.drives.items()
+        return [f"{axis} is {outcome}" for axis, outcome in said if outcome != StopOutcome.CONFIRMED]
 
 
 def stop(bench: CanBench, draft: Draft) -> Stopped:
@@ -75,8 +79,10 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     """
     found_until_now = set(axes_of(draft))
     known = found_until_now | set(_axes_in(draft.file))
-    found = _stopped(bench, known, every=not found_until_now and draft.path.exists())
-    return Stopped({str(axis): outcome for axis, outcome in found.items()})
+    is_open = not found_until_now and draft.path.exists()
+    found = _stopped(bench, known, every=is_open)
+    problem = OTHERS if is_open and known else ""
+    return Stopped({str(axis): outcome for axis, outcome in found.items()}, problem)
 
 
 def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:

@@ -116,3 +116,15 @@ def test_what_a_robot_did_before_it_said_its_name_stands_under_that_name(
     bench.desk.remove(other)
     bench.draw(around)
     assert {line.robot for line in around.events.lines if "at last" in line.text} == {"simulated-exo"}
+
+
+def test_what_one_robot_did_stays_its_own_when_another_one_answers_at_its_address(
+    around: Around, bench: Bench
+) -> None:
+    other = bench.add("127.0.0.1-7421", 7421)
+    other.take([described("exo-01")])
+    other.tell(NewsKind.STOP, "STOP NOT CONFIRMED: no link")
+    other.take([described("exo-02")])
+    bench.draw(around)
+    (line,) = (one for one in around.events.lines if "STOP NOT" in one.text)
+    assert line.robot.startswith("exo-01")

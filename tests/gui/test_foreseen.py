@@ -182,7 +182,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
         (
             dict.fromkeys(JOINTS, 6.0) | {"left_knee": None},
             False,
-            "a drive is not known, and no other is enabled",
+            "1 of 6 drives not known, no other is enabled",
             "Not judged",
         ),
     ],

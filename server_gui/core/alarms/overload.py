@@ -33,9 +33,10 @@ def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> I
     that are not: a load makes all of them late, so it is named after their own cable.
     """
     found = list(alarms)
-    is_common = 2 * sum(one.kind in PARTS for one in found) >= parts
+    late = [one for one in found if one.kind in SILENT and not any(word in one.what for word in UNPLUGGED)]
+    is_common = 2 * sum(one.kind in PARTS for one in late) >= parts
     for one in found:
-        if not first or one.kind not in SILENT or any(word in one.what for word in UNPLUGGED):
+        if not first or one not in late:
             yield one
         elif one.kind in PARTS and not is_common:
             also = (text.replace(" first", "") for text in first)

@@ -392,9 +392,7 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
         return STOPPING
     if any(word in _IN_FAULT for word in words):
         return IN_FAULT
-    if ENABLED in words or not any(words):
-        return ""
-    return NONE_ENABLED if all(words) else "a drive is not known, and no other is enabled"
+    return NONE_ENABLED if words and all(words) and ENABLED not in words else ""
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:

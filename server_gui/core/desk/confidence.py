@@ -12,6 +12,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
 from server_gui.core.prediction.state import FEW, Quality
+from server_gui.core.tuning.stop import ENABLED
 
 NOT_SEEN: Final = ("lost", "stale")
 SOURCES: Final = {
@@ -58,7 +59,16 @@ def belief(told: Told) -> Confidence:
 
 def not_judged(station: Station) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
-    return undriven(station.robot, station.stopping)
+    return undriven(station.robot, station.stopping) or _not_known(station)
+
+
+def _not_known(station: Station) -> str:
+    """Return that too little is known of the drives: of those that are, none is enabled."""
+    words = [station.robot.word(f"{joint}.state") for joint in station.robot.names("joint")]
+    unknown = words.count(None)
+    if not 0 < unknown < len(words) or ENABLED in words:
+        return ""
+    return f"{unknown} of {len(words)} drives not known, no other is enabled"
 
 
 def blind(station: Station) -> str:

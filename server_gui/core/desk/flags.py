@@ -199,6 +199,7 @@ _TOLD: Final = {
     EventKind.NAME.value: FlagKind.CHANGE,
     EventKind.CLOCK_STEP.value: FlagKind.CHANGE,
     EventKind.ADAPTED.value: FlagKind.CHANGE,
+    EventKind.FORGOTTEN.value: FlagKind.CHANGE,
 }
 _HOW: Final = {FlagKind.FAULT: "fault", FlagKind.STOP: "quick stop"}
 _ENTRIES: Final = {

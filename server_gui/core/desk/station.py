@@ -185,7 +185,8 @@ class Station:
 
     def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
         """Note something about this robot, or about a component of it."""
-        self.news.add(kind, self.name, text, about)
+        title = "" if self.robot.description is None else self.title
+        self.news.add(kind, self.name, text, about, title)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""
@@ -223,8 +224,7 @@ class Station:
                     self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
-                    boot_id = None if before is None else before.boot_id
-                    self.stopping.read(event.journal.entries, self.flash.clock, boot_id)
+                    self.stopping.read(event.journal.entries, self.robot.boot_id)
                     if before is not None:
                         self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():
@@ -262,7 +262,7 @@ class Station:
             self.flags.clear()
             self._states = StateWatch()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
-        self.stopping.described(description.stop.held, description.stop.reason)
+        self.stopping.described(description.stop.held, description.stop.reason, is_anew=is_another)
         if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):
             self.tell(
                 NewsKind.WARNING, "another robot is called so too: give one another [robot] name in its file"
@@ -321,7 +321,7 @@ class Station:
 
     def note_stop(self, sent: Sent) -> None:
         """Follow what becomes of a STOP that was sent."""
-        number = self.stopping.sent(sent.off, sent.at_ns)
+        number = self.stopping.sent(sent.off, sent.at_ns, self.flash.clock, self.robot.boot_id)
         when_done(
             sent.future,
             self._deliver,

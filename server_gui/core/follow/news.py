@@ -49,11 +49,12 @@ class Item:
     count: int = 1
     first_s: float | None = None
     about: str = ""  # a component, as alarms name it
+    title: str = ""  # what people called the robot then; empty: it had not said its name yet
     key: tuple[NewsKind, str, str] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Find what repeats of it have in common: everything but the numbers in it."""
-        object.__setattr__(self, "key", (self.kind, self.robot, _NUMBER.sub("#", self.text)))
+        object.__setattr__(self, "key", (self.kind, self.title or self.robot, _NUMBER.sub("#", self.text)))
 
 
 class News:
@@ -63,9 +64,9 @@ class News:
         self.items: collections.deque[Item] = collections.deque()
         self.revision = 0
 
-    def add(self, kind: NewsKind, robot: str, text: str, about: str = "") -> None:
+    def add(self, kind: NewsKind, robot: str, text: str, about: str = "", title: str = "") -> None:
         """Note something; what is told again within a minute is counted, what has not changed is not told."""
-        item = Item(time.time(), kind, robot, text, about=about)
+        item = Item(time.time(), kind, robot, text, about=about, title=title)
         if self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
             return
         before = None if kind in DONE else next(self._lately(item), None)

@@ -175,6 +175,11 @@ class Robot:
         """Return the instant that is shown, UTC."""
         return time.time()
 
+    @property
+    def boot_id(self) -> str | None:
+        """Which start of the robot's computer this is, once it has said so."""
+        return None if self.description is None else self.description.boot_id
+
     def names(self, kind: str) -> list[str]:
         """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]

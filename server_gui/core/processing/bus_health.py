@@ -122,7 +122,8 @@ def rated(bus: BusInfo) -> list[Rated]:
     if level(bus) in (BusHealthLevel.GOOD, BusHealthLevel.UNKNOWN):
         return []
     load, full = bus.load_percent or 0.0, []
-    own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago
+    is_known = bus.load_percent is not None  # else what the gateway found a moment ago is all there is
+    own = [one for one in bus.findings if not (is_known and one.words.endswith(TAKEN))]
     if len(own) < len(bus.findings) or load >= (FULL_PERCENT if own else BUSY_PERCENT):
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} {TAKEN}", fewer(bus))]

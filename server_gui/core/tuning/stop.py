@@ -91,6 +91,8 @@ class StopProgress:
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
     _earlier: "tuple[Any, ...] | None" = None  # of a STOP that was confirmed and held when this one was sent
+    _clock: ClockOffset | None = None  # of the robot when it was sent
+    _boot_id: str | None = None  # likewise
     _entry: int = 0  # of the journal: the newest that was read
     _is_written: bool = True  # whether the latest STOP was read in the journal: resets before are older
 
@@ -113,16 +115,28 @@ class StopProgress:
         """Whether drives were told to stop and have not shown it: then "enabled" is no good state."""
         return self.state is StopState.NOT_CONFIRMED
 
-    def sent(self, off: Collection[str] = (), at_ns: int | None = None) -> int:
-        """Note that a STOP has gone out, and return its number; `off` drives are seen not to be enabled."""
+    def sent(
+        self,
+        off: Collection[str] = (),
+        at_ns: int | None = None,
+        clock: ClockOffset | None = None,
+        boot_id: str | None = None,
+    ) -> int:
+        """Note that a STOP has gone out, and return its number.
+
+        `off` drives are seen not to be enabled; the robot's `clock` and boot are those of now. One that
+        repeats another that nobody has answered yet is timed from that.
+        """
         self.number += 1
-        is_again = self.held and self.state is StopState.CONFIRMED
-        self._earlier = self._proven if is_again else None
-        now_ns = time.monotonic_ns()
-        self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", now_ns if at_ns is None else at_ns
-        self.why, self.answered_ms, self.was_ended = "", None, False
-        self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
-        self.proofs, self._off, self._confirmed, self._is_written = {}, off, (), False
+        if self.state is not StopState.SENT:
+            is_again = self.held and self.state is StopState.CONFIRMED and set(off) >= set(self._confirmed)
+            self._earlier = self._proven if is_again else None
+            now_ns = time.monotonic_ns()
+            self.at_ns = now_ns if at_ns is None else at_ns
+            self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
+            self.proofs, self._off, self._clock, self._boot_id = {}, off, clock, boot_id
+        self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
+        self._confirmed, self.was_ended, self._is_written = (), False, False
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
@@ -158,52 +172,58 @@ class StopProgress:
 
     # --- what the robot shows meanwhile
 
-    def described(self, held: bool, reason: str | None) -> None:
-        """Take the robot's description on every new link: a stop may have ended while there was none."""
+    def described(self, held: bool, reason: str | None, *, is_anew: bool = False) -> None:
+        """Take the robot's description on every new link: a stop may have ended while there was none.
+
+        `is_anew`: its computer has started again since.
+        """
         self.held, self.reason = held, (reason or "") if held else ""
-        if not held and self.state is StopState.CONFIRMED and self._is_written:
+        if not held and self.state is StopState.CONFIRMED and (self._is_written or is_anew):
             self.was_reset(held=False)
 
-    def read(
-        self,
-        entries: Iterable[Mapping[str, Any]],
-        clock: ClockOffset | None = None,
-        boot_id: str | None = None,
-    ) -> None:
+    def read(self, entries: Iterable[Mapping[str, Any]], boot_id: str | None = None) -> None:
         """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
 
-        They may be older than our STOP, by the robot's clock of this boot: what they hold and reset is
-        not that one.
+        They may be older than our STOP, by the robot's clock: what they hold and reset is not that one.
+        `boot_id` is that of now.
         """
         told = [(number, entry) for entry in entries if isinstance(number := entry.get("n"), int)]
         if told and told[-1][0] < self._entry:
             self._entry = 0  # another journal
         is_open = self.state is StopState.NOT_CONFIRMED and not self.held
-        was_ended, is_history = self.was_ended, self._entry == 0
+        was_ended, is_history, is_older = self.was_ended, self._entry == 0, False
         for number, entry in told:
-            if number > self._entry:
-                self._entry = number
-                if not self._is_before(entry, clock, boot_id):
-                    self._read(entry, is_open=is_open)
+            if number <= self._entry:
+                continue
+            self._entry = number
+            if not self._is_before(entry, boot_id):
+                self._read(entry, is_open=is_open)
+            elif entry.get("what") in HELD_BY and not self.held:  # held still, as far as is read
+                self.held, self.reason, is_older = True, _said(entry), True
+            elif is_older and _is_reset(entry):
+                self.held, self.reason, is_older = False, "", False
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since
 
-    def _is_before(self, entry: Mapping[str, Any], clock: ClockOffset | None, boot_id: str | None) -> bool:
+    def _is_before(self, entry: Mapping[str, Any], boot_id: str | None) -> bool:
         """Return whether it is known to be older than our STOP, which was not read yet."""
         is_ours_open = self.state is not StopState.IDLE and not self._is_written
-        if not is_ours_open or self.at_ns is None or clock is None or boot_id is None:
+        if not is_ours_open or self.at_ns is None or self._boot_id is None:
             return False
-        written_ns = entry.get("monotonic_ns")
-        if entry.get("boot_id") != boot_id or not isinstance(written_ns, int):
-            return entry.get("boot_id") is not None
-        return written_ns - clock.offset_ns < self.at_ns - CLOCKS_NS
+        of = entry.get("boot_id")
+        if of != self._boot_id:
+            return of is not None and of != boot_id
+        written_ns, clock = entry.get("monotonic_ns"), self._clock
+        if clock is None or not isinstance(written_ns, int):
+            return False
+        return written_ns - clock.offset_ns < self.at_ns - CLOCKS_NS - clock.uncertainty_ns
 
     def _read(self, entry: Mapping[str, Any], *, is_open: bool) -> None:
         what = entry.get("what")
         self._is_written |= what in HELD_BY or (what == AGAIN and "drive" not in entry)
         if what in HELD_BY:
             self._holds(entry)
-        elif what == "reset" and not entry.get("held"):
+        elif _is_reset(entry):
             if is_open:
                 self.held, self.reason = False, ""
             elif self._is_ended_by_reset:
@@ -286,10 +306,8 @@ class StopProgress:
         return (own, self.reason) if own else (self.reason or "it is held until it is reset", "")
 
     def _holds(self, entry: Mapping[str, Any]) -> None:
-        who, reason = entry.get("who"), entry.get("reason")
-        said = ", ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
         if not self.held or not self.reason:
-            self.reason = said
+            self.reason = _said(entry)
         if not self.held:
             self.since_s = _utc_s(entry)
         self.held, self.was_ended = True, False
@@ -297,6 +315,17 @@ class StopProgress:
     def _not_confirmed(self, why: str) -> None:
         self.state, self.why = StopState.NOT_CONFIRMED, why
         self.text = f"STOP NOT CONFIRMED: {why}. Use the hardware stop"
+
+
+def _said(entry: Mapping[str, Any]) -> str:
+    """Return why it was stopped, and by whom."""
+    who, reason = entry.get("who"), entry.get("reason")
+    return ", ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
+
+
+def _is_reset(entry: Mapping[str, Any]) -> bool:
+    """Return whether a stop ended with it."""
+    return entry.get("what") == "reset" and not entry.get("held")
 
 
 def _utc_s(entry: Mapping[str, Any]) -> float:

@@ -93,7 +93,11 @@ class NewsModel(QAbstractTableModel):
         active = [_of_alarm(*told) for told in worst_first]
         alarms = {one.name: one.alarms for one in self._desk.stations}
         news = (
-            _of_item(item, self._titles.get(item.robot, item.robot), event_mark(item, alarms.get(item.robot)))
+            _of_item(
+                item,
+                item.title or self._titles.get(item.robot, item.robot),
+                event_mark(item, alarms.get(item.robot)),
+            )
             for item in self._desk.news.items
             if item.kind in self._kinds
         )
@@ -101,6 +105,10 @@ class NewsModel(QAbstractTableModel):
         self.pinned = len(active)
         self.lines = [*active, *(line for line in news if self._has_words(line))]
         self.endResetModel()
+
+    def _title(self, item: Item) -> str:
+        """Return what the robot was called then, or has been called since where it had no name yet."""
+        return item.title or self._titles.get(item.robot, item.robot)
 
     def instant(self, line: EventRow) -> At | None:
         """Return where a line is seen in the signals; None: it is of no robot, or nothing came from it."""

@@ -212,13 +212,13 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    counts = enabled_text(station.robot, live=station.is_live).split(", ")
+    count = enabled_text(station.robot, live=station.is_live)  # whole: the rest makes it look better
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (*counts, "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
     few = SHORTER.get(mark.word, mark.word).capitalize()
-    brief = (few, counts[0].removesuffix(" enabled"), *counts[1:])
-    return Words(mark, mark.word.capitalize(), (*counts, "CiA 402"), brief=brief)
+    brief = (few, count.removesuffix(" enabled"))
+    return Words(mark, mark.word.capitalize(), (count, "CiA 402"), brief=brief)
 
 
 def _status(station: Station) -> Words:

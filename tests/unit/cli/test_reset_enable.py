@@ -89,6 +89,7 @@ def test_a_question_shows_letters_that_would_command_the_terminal_as_what_they_a
         ("quick stop active", True),
         ("fault reaction active", True),
         ("fault", False),
+        ("", True),  # not a state that is known
     ],
 )
 def test_every_drive_that_may_hold_its_joint_is_asked_about(

@@ -10,11 +10,12 @@ import can
 import pytest
 
 from drivers.errors import SettingsError
+from drivers.joint.quick_stop import StopOutcome
 from drivers.scan.products import Library
 from eds.profile import profiles
 from eds.shipped import SHIPPED
 from gateway.cli.commission import main
-from gateway.commission import joints, nodes
+from gateway.commission import joints, nodes, stopping
 from gateway.commission.axes import Axis
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Draft, alone
@@ -289,6 +290,12 @@ def test_a_stop_asks_every_node_where_the_draft_cannot_be_read(
         sent = [frame.arbitration_id for frame in iter(lambda: other.recv(0.5), None)]
     assert sent[0] == 0x602, "what is known comes first"
     assert {0x600 + node for node in range(1, 128)} <= set(sent)
+
+
+def test_a_stop_is_not_confirmed_where_there_may_be_drives_that_nobody_knows() -> None:
+    said = stopping.Stopped({"node 5": StopOutcome.CONFIRMED}, stopping.OTHERS)
+    assert not said.confirmed
+    assert said.words == f"NOT CONFIRMED: {stopping.OTHERS}; only node 5 confirmed it"
 
 
 def test_the_rated_torque_that_is_shown_is_in_the_unit_of_its_maker(

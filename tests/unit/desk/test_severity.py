@@ -7,14 +7,14 @@ from msgspec.structs import replace
 
 from gateway.wire.component import QualityInfo, Snapshot
 from server_gui.core.alarms.alarm import Alarm, Alarms
-from server_gui.core.alarms.marks import NEWS, Mark, enabled_text
+from server_gui.core.alarms.marks import NEWS, Mark
 from server_gui.core.alarms.severity import bus_level, colour_of, event_mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described, Event, Looked
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.processing.bus_health import BusHealthLevel as Level
-from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+from tests.support.desk import Bench, described, looked, walking
 
 MISSED = "the drive is in fault: 0x8130 life guard or heartbeat error"
 
@@ -82,11 +82,3 @@ def test_without_an_alarm_an_event_is_as_bad_as_the_table_says() -> None:
         (NewsKind.FAULT, Kind.FAULT),
     ):
         assert (NEWS[news].shape, NEWS[news].colour) == (TEXTS[kind].mark.shape, TEXTS[kind].mark.colour)
-
-
-def test_a_drive_that_is_not_known_is_not_counted_as_off() -> None:
-    station = Bench(Desk()).add("exo-01")
-    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS[1:]}
-    station.take([described(), telemetry([1], {**states, f"{JOINTS[0]}.state": [None]})])
-    assert enabled_text(station.robot, live=True) == "0 of 5 enabled, 1 not known"
-    assert enabled_text(station.robot, live=False) == "– of 6 enabled"

@@ -102,15 +102,15 @@ def at(number: int, what: str, ours_ns: int, boot_id: str = BOOT, **more: object
 def test_a_stop_and_its_reset_that_are_older_than_ours_do_not_end_it(said: Stopped, boot_id: str) -> None:
     """The journal was read at the first link after a STOP that no drive had confirmed: its alarm was gone."""
     stopping = StopProgress()
-    stopping.answered(stopping.sent(at_ns=SENT_NS), said)
+    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), said)
     stage = stopping.stage
     before_ns = SENT_NS - 1_000_000_000 if boot_id == BOOT else SENT_NS + 1_000_000_000
     older = [at(1, "stop", before_ns, boot_id), at(2, "reset", before_ns, boot_id, held=False)]
-    stopping.read(older, CLOCK, BOOT)
+    stopping.read(older, BOOT)
     assert stopping.stage == stage
-    stopping.read([*older, at(3, "stop", SENT_NS + 3_000_000)], CLOCK, BOOT)
+    stopping.read([*older, at(3, "stop", SENT_NS + 3_000_000)], BOOT)
     assert stopping.stage == stage
-    stopping.read([at(4, "reset", SENT_NS + 9_000_000_000, held=False)], CLOCK, BOOT)
+    stopping.read([at(4, "reset", SENT_NS + 9_000_000_000, held=False)], BOOT)
     assert stopping.stage == (StopState.IDLE, False)
 
 
@@ -152,3 +152,44 @@ def test_a_stop_of_a_robot_that_is_stopped_leaves_the_proof_of_the_first() -> No
     stopping.was_reset(held=False)
     stopping.answered(stopping.sent(at_ns=20_000_000_000), ALL, at_ns=20_030_000_000)
     assert stopping.text.endswith("in 30 ms"), "it was enabled since"
+
+
+def test_drives_that_were_enabled_since_are_proven_anew() -> None:
+    """Somebody else had reset and enabled them: nobody had read that yet."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=0), ALL, at_ns=22_000_000)
+    stopping.answered(stopping.sent(off=[], at_ns=5_000_000_000), ALL, at_ns=5_900_000_000)
+    assert stopping.text.endswith("in 900 ms")
+
+
+def test_a_stop_that_repeats_one_without_an_answer_is_timed_from_that() -> None:
+    stopping = StopProgress()
+    stopping.sent(at_ns=0)
+    again = stopping.sent(off=ALL.drives, at_ns=796_000_000)
+    stopping.answered(again, ALL, at_ns=800_000_000)
+    assert stopping.text.endswith("in 800 ms"), "not the 4 ms of the second"
+
+
+def test_a_confirmed_stop_ends_where_the_robot_has_started_again_and_holds_none() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), ALL)
+    stopping.described(held=False, reason=None, is_anew=True)
+    assert stopping.stage == (StopState.IDLE, False)
+
+
+def test_a_clock_is_believed_no_further_than_it_says() -> None:
+    stopping = StopProgress()
+    unsure = ClockOffset(CLOCK.offset_ns, 200_000_000)
+    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=unsure, boot_id=BOOT), ALL)
+    stopping.read([at(1, "stop", SENT_NS - 80_000_000)], BOOT)
+    stopping.read([at(2, "reset", SENT_NS + 3_000_000_000, held=False)], BOOT)
+    assert stopping.stage == (StopState.IDLE, False)
+
+
+def test_a_stop_of_somebody_else_is_held_also_if_it_is_older_than_ours() -> None:
+    """Ours was not answered, theirs held: there was no way to reset it."""
+    stopping = StopProgress()
+    stopping.failed(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), "no answer within 5 s")
+    before_ns = SENT_NS - 1_000_000_000
+    stopping.read([at(1, "stop", before_ns, reason="door", who="ada")], BOOT)
+    assert (stopping.stage, stopping.reason) == ((StopState.NOT_CONFIRMED, True), "door, by ada")
