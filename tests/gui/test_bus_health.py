@@ -20,6 +20,7 @@ from server_gui.views.resources.bus_card import FRAMES, SENDER, STATE, controlle
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.resources.load_bar import LoadBar
 from server_gui.views.theme import Theme
+from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described, looked, walking
 
@@ -222,3 +223,19 @@ def test_the_marks_of_the_load_are_named(theme: Theme, width: int) -> None:
     assert "full" in full
     assert "95 %" in full
     destroy(bar)
+
+
+@pytest.mark.parametrize("width", [1024, 1366, 1920])
+def test_a_busy_desk_computer_is_told_on_the_last_line_and_nothing_there_is_cut(
+    bar: StatusBar, bench: Bench, theme: Theme, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setattr(bench.station, "is_full", lambda: True)
+    theme.set(scale=1.5)
+    bar.resize(width, bar.height())
+    bench.station.take([walking(10), BusesSeen((BUS,), time.monotonic_ns())])
+    bar.refresh()
+    QApplication.processEvents()
+    assert "▲" in bar._window.shown
+    assert "fps" in bar._window.shown
+    assert rules.halved_numbers(bar) == []
+    assert bar._window.is_whole

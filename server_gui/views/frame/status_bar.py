@@ -17,16 +17,16 @@ from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel
 from server_gui.views.frame.recording_chip import TONES
 from server_gui.views.resources.bus_card import LEVELS, shown_mark
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text, set_tone
+from server_gui.views.widgets.card import set_tone
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 FRAMES: Final = 60
 FRAMES_HINT: Final = (
     "Frames that this window draws a second; while this computer is busy, what is shown is late"
 )
-FULL: Final = "▲ this computer is busy · "
+FULL: Final = ("▲ this computer is busy", "▲ busy")
 STOP: Final = (
     "STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop",
     "F12: software stop, not an emergency stop",
@@ -42,7 +42,7 @@ class StatusBar(QStatusBar):
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
         self.computer, self.bus, self.recording = ShrinkingLabel(), ShrinkingLabel(), ShrinkingLabel()
-        self._window = PlainLabel()
+        self._window = ShrinkingLabel()
         self._icon, self._bus_icon = MarkIcon(theme, 11), MarkIcon(theme, 11)
         stop = ShrinkingLabel()
         stop.say(*STOP)
@@ -78,7 +78,8 @@ class StatusBar(QStatusBar):
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
         is_full = station is not None and station.is_full()
-        set_text(self._window, f"{FULL if is_full else ''}{self._rate():.0f} fps")
+        rate = f"{self._rate():.0f} fps"
+        self._window.say(*((*(f"{busy} · {rate}" for busy in FULL), rate) if is_full else (rate,)))
         set_tone(self._window, "warn" if is_full else "")
         set_tip(self._window, FRAMES_HINT)
         QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)  # no number is drawn where it was

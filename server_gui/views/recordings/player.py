@@ -54,6 +54,7 @@ NOT_REPLAYED_HINT: Final = (
     "What is replayed are the robot's signals: what its buses or computers lacked then does not show"
 )
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
+SETTLES: Final = 8  # frames until all plots are there
 SLOW: Final = 5  # frames between two looks at what people read
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)
@@ -85,7 +86,7 @@ class Player(QWidget):
         )
         self.beside_bar = BesideBar(self.beside)
         self._views = (self.overview, self.signals)
-        self._is_beside_new = False
+        self._settling = 0  # frames until what is beside has its place
         self._was_wrong = False  # in what was played of it
         self._around: tuple[str, int] | None = None  # a channel and an instant, to be shown once it is read
         self._stack = QStackedWidget()
@@ -194,9 +195,9 @@ class Player(QWidget):
         if station is not None and (scene.beside is None or scene.beside.station is not station):
             scene.put_beside(station)
             scene.align = Align.NOW
-            self._is_beside_new = True
-        elif self._is_beside_new and self.signals.cards:
-            self._is_beside_new = False  # tools and channels may take all of a small screen
+            self._settling = SETTLES
+        elif self._settling and self.signals.cards:
+            self._settling -= 1  # tools and channels may take all of a small screen
             bring_into_sight(self.signals.cards[0], first=True)
 
     # --- how it is put together

@@ -166,7 +166,7 @@ def uploaded(bench: Bench) -> None:
     """What was recorded until now is in the store."""
     hand = bench.hand
     hand.click("Cloud")
-    hand.click("Upload now")
+    hand.click("Look again")
     hand.sees("no batches wait", within_s=AGAIN_S)
     hand.sees("telemetry", within_s=AGAIN_S)
     hand.keep("cloud")
@@ -203,7 +203,7 @@ def store_gone(bench: Bench) -> None:
     bench.store.rename(away)
     bench.store.write_text("no folder")
     hand.click("Cloud")
-    hand.click("Upload now")
+    hand.click("Look again")
     hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
     for title, key, words in (
