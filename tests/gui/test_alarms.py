@@ -22,7 +22,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
-from server_gui.views.alarms.words import fewer
+from server_gui.views.alarms.words import REMEDY, fewer
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
@@ -480,3 +480,16 @@ def test_how_to_go_on_after_a_stop_is_whole_before_it_is_said_who_has_stopped(
     said = window.alarms.details.text()
     assert said.startswith("since ")
     assert said.endswith("then enable the drives: start the robot's controller again")
+
+
+def test_what_to_check_has_room_before_the_register_of_a_code(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    fault(bench)
+    bench.draw(window)
+    assert CAUSE.partition(" (")[0] in window.alarms.headline.text()
+    said = window.alarms.details.text()
+    assert said.startswith("since ")
+    assert REMEDY in said

@@ -74,3 +74,15 @@ def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(
     overview.refresh()
     assert overview.now.drives.main.text() == f"STOPPED since {time_of_day(stopping.since_s or 0.0)}"
     assert overview.now.drives.detail.text() == "6/6 confirmed in 21 ms"
+
+
+def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, bench: Bench) -> None:
+    """It said Operation enabled, in large letters."""
+    bench.station.take([walking(10), looked()])
+    stopping = bench.station.stopping
+    stopping.failed(stopping.sent(), "no link")
+    overview.read_now()
+    overview.refresh()
+    drives = overview.now.drives
+    assert (drives.main.text(), drives._icon._mark.colour) == ("STOP NOT CONFIRMED", "bad")
+    assert drives.detail.text() == "operation enabled · 6 of 6 enabled"

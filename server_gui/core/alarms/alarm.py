@@ -75,6 +75,11 @@ class Alarm:
         return self._said("; ".join(filter(None, (self.what, self.aside))))
 
     @property
+    def bare(self) -> str:
+        """The line without what is said in brackets at its end: the list has it."""
+        return self._said(ASIDE.sub("", self.what))
+
+    @property
     def brief(self) -> str:
         """The line where there is little room: of several reasons the first, and that there are more."""
         first, more, _ = self.what.partition("; ")

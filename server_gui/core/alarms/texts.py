@@ -141,7 +141,7 @@ TEXTS: Final = dict(
             "see to this computer's disk and load; what comes until then may be lost",
         ),
         _text(Kind.RECORDING, "triangle", "warn", "see to the disk of the spool (gwrms collect --status)"),
-        _text(Kind.UPLOAD, "triangle", "warn", "nothing is lost: it waits in the spool; check the store"),
+        _text(Kind.UPLOAD, "triangle", "warn", "what is recorded waits in the spool; check the store"),
         _text(
             Kind.BLIND, "triangle", "warn", "the guard does not see what it is to watch: check that component"
         ),

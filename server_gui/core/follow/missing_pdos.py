@@ -24,7 +24,7 @@ KEPT_NS: Final = 20_000_000_000  # of looks that are judged, and at least
 KEPT_LOOKS: Final = 16  # so many, however far apart they are
 CHECK: Final = "see what keeps the robot's computer busy (gwrms blame), or take load from it"
 BUSY_PERCENT: Final = 90.0  # of the computer's cores
-NEARLY_ALL: Final = 0.75  # of the nodes
+MANY: Final = 0.5  # of the nodes
 
 
 class WatchedNode(NodeInfo, frozen=True):
@@ -128,8 +128,8 @@ class MissingPdos:
         if any(told):  # it is the bus's trouble: nobody is told that others with as many are fine
             told = [one or history.join(share) for one, (history, share) in zip(told, known, strict=True)]
         counted = [one for one, (_, share) in zip(told, known, strict=True) if one or share is not None]
-        missing = sum(map(bool, counted))  # at one alone, which has a cable of its own, or at nearly all
-        is_busy = is_busy and missing > 1 and missing >= NEARLY_ALL * len(counted)
+        missing = sum(map(bool, counted))  # at one alone, which has a cable of its own, or at many
+        is_busy = is_busy and missing > 1 and missing >= MANY * len(counted)
         nodes = [
             node
             if (percent, is_busy) == (told_percent(node), False)

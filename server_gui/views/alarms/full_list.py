@@ -105,7 +105,7 @@ class AlarmRow(QFrame):
         self._icon.show_mark(mark)
         set_tone(self, mark.colour)
         more = "over" if is_over else ""
-        wordings = [headline(told, named=named, more=more, brief=brief) for brief in range(3)]
+        wordings = [headline(told, named=named, more=more, brief=brief) for brief in range(4)]
         said = details(one, now_s(station), each=True)
         self.buttons.offer(told)
         self.buttons.setVisible(not is_over)

@@ -187,7 +187,7 @@ class AlarmStrip(ClickableFrame):
 
     def _wordings(self, told: Told) -> tuple[str, ...]:
         """Return its line for less and less room; nothing is cut of why a stop is not confirmed."""
-        said = tuple(headline(told, named=self.named, brief=brief) for brief in range(3))
+        said = tuple(headline(told, named=self.named, brief=brief) for brief in range(4))
         alarm = told[1].alarm
         return said[: 2 if alarm.aside else 1] if alarm.kind is Kind.NOT_STOPPED else said
 

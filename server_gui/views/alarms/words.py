@@ -49,6 +49,8 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
         return Mark("ring", "dim"), "No alarms", "danger is not known"
     if recording is not None and recording.can_ask and not recording.reach.is_known:
         return Mark("ring", "dim"), "No alarms", "the store is not known"
+    if not station.robot.has_rate():
+        return Mark("ring", "dim"), "No alarms", "its rate is not known yet"
     if station.is_full():
         return Mark("triangle", "warn", "busy"), "This computer is busy", BUSY
     return Mark("disc", "good"), "No alarms", "all ok"
@@ -77,10 +79,10 @@ def going_on(told: Told, worse: Alarm, *, named: bool) -> tuple[str, ...]:
 
 
 def headline(told: Told, *, named: bool, more: str = "", brief: int = 0) -> str:
-    """Whose it is, what is wrong, and whether that is now; `brief` is 0 for all, to 2 for its cause alone."""
+    """Whose it is, what is wrong, and whether that is now; `brief` is 0 for all, to 3 for its cause alone."""
     station, one = told
     alarm = one.alarm
-    said_of = (alarm.line, alarm.brief, alarm.least)[brief]
+    said_of = (alarm.line, alarm.bare, alarm.brief, alarm.least)[brief]
     line = " · ".join(filter(None, (station.title if station and named else "", said_of)))
     marks = [more, "" if alarm.is_now else "last known", "acknowledged" if one.is_acknowledged else ""]
     said = ", ".join(filter(None, marks))

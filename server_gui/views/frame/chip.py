@@ -88,6 +88,12 @@ class Chip(QFrame):
         words = max(bold.horizontalAdvance(main), plain.horizontalAdvance(" · ".join(parts)))
         return max(self.needs(brief=self._is_brief), words + self._around(brief=self._is_brief))
 
+    @property
+    def whole(self) -> int:
+        """How wide it is with its first line whole, however long that is."""
+        bold = QFontMetrics(self._theme.text_font(bold=True))
+        return max(self.needs(), bold.horizontalAdvance(self._words.main) + self._around())
+
     def say(self, words: Words) -> None:
         """Show this."""
         self._words = words

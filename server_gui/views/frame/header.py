@@ -160,6 +160,10 @@ class Header(QWidget):
                     brief.discard(name)
                 else:
                     needs[name] = least
+        usual = needs.get("robot", 0)
+        if usual:  # its name is cut only where that gives room to more
+            needs["robot"] = chips["robot"].whole
+            needs["robot"] = needs["robot"] if has_room() else usual
         for name in BRIEF:
             chips[name].be_brief(name in brief)
         return needs

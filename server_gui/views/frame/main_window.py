@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from PySide6.QtCore import QPoint, QSettings, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -178,6 +178,8 @@ class MainWindow(QMainWindow):
         finally:  # whatever becomes of a page: STOP, alarms and what is known of the robot go on
             if due:
                 self._draw_around(shown=shown)
+            # New words are drawn in new places.
+            QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
 
     def _draw_around(self, *, shown: bool) -> None:
         """All but the page."""

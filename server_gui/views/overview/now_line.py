@@ -19,6 +19,7 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
+NOT_CONFIRMED: Final = Mark("square", "bad", "STOP NOT CONFIRMED")
 ON_TRIAL: Final = Mark("half", "warn", "on trial")
 
 
@@ -180,11 +181,13 @@ class NowLine(QFrame):
 
 def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
+    if station.stopping.is_unproven:
+        known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
+        return NOT_CONFIRMED, ("STOP NOT CONFIRMED", "NOT CONFIRMED"), (f"{known} · {count}", count)
     if not station.is_live:
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
-    unproven = station.stopping.is_unproven
-    mark = drives_mark(station.robot, is_unproven=unproven)
-    if station.stopping.held and not unproven and mark.colour == "dim":  # off, and held so
+    mark = drives_mark(station.robot)
+    if station.stopping.held and mark.colour == "dim":  # off, and held so
         return (
             Mark("triangle", "warn", "STOPPED"),
             _since(station),

@@ -118,7 +118,7 @@ class Review(QWidget):
                 f"Changed elsewhere since you began: {', '.join(elsewhere)}. Writing overwrites that."
             )
         self.said.setText("\n".join([*(said or [ALL_OR_NONE]), *filter(None, [acts])]))
-        self.said.setProperty("tone", "bad" if said else "good")
+        self.said.setProperty("tone", "bad" if said else "warn" if acts else "good")
         self.said.style().polish(self.said)
         self._enable(False)
         self._allowed = bool(changes) and not problems

@@ -15,7 +15,7 @@ from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.flags import Flag
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.cursors import FLAGS
+from server_gui.views.widgets.cursors import FIRST, FLAGS
 from server_gui.views.widgets.plain import set_tip
 
 SECOND_NS: Final = 1_000_000_000
@@ -185,7 +185,9 @@ class Timeline(QWidget):
         painter.drawRect(bar)
         self._draw_ticks(painter, bar)
         self._draw_beside(painter, bar)
-        for flag in self._flags:
+        for flag in sorted(
+            self._flags, key=lambda one: FIRST.index(one.kind), reverse=True
+        ):  # the worst on top
             self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)
         x = self._x(self._position_ns)
         painter.setPen(QPen(self._theme.colour("text"), 2))
