@@ -39,7 +39,8 @@ def test_after_a_reset_how_to_go_on_is_said_with_a_warning_that_is_not_its_cause
 def test_without_a_warning_the_strip_is_as_bad_as_the_drives_are(
     around: Around, bench: Bench, monkeypatch: pytest.MonkeyPatch, state: float, is_off: bool
 ) -> None:
-    monkeypatch.setattr(type(bench.station.robot), "has_rate", lambda _robot: True)
+    monkeypatch.setattr(type(bench.station.robot), "has_rate", lambda *_: True)
+    monkeypatch.setattr(type(bench.station.robot), "is_slow", lambda *_: False)
     reset(bench, state)
     settle(around, bench)
     assert bench.station.mark.colour == ("dim" if is_off else "warn")

@@ -48,7 +48,8 @@ def test_no_alarm_on_a_full_computer_is_not_called_all_ok(
     bench.station.take([described(), walking(100), looked()])
     bench.station.predictions.foresees = False
     assert quiet(bench.station)[0].colour == "dim", "how many rows come is not known yet"
-    monkeypatch.setattr(type(bench.station.robot), "has_rate", lambda _robot: True)
+    monkeypatch.setattr(type(bench.station.robot), "has_rate", lambda *_: True)
+    monkeypatch.setattr(type(bench.station.robot), "is_slow", lambda *_: False)
     assert quiet(bench.station)[2] == "all ok"
     bench.station.is_full = lambda: True
     mark, headline, why = quiet(bench.station)
