@@ -3,6 +3,7 @@
 import time
 
 from gateway.client import ConnectionState, NotConnected
+from gateway.wire.stop import Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
 from tests.gui import rules
@@ -78,3 +79,16 @@ def test_an_empty_list_says_what_to_do(around: Around, bench: Bench) -> None:
     bench.desk.stations = []
     around.robots.refresh()
     assert not around.robots.none.isHidden()
+
+
+def test_a_narrow_card_of_a_stopped_robot_says_by_how_many_drives_and_how_soon(
+    around: Around, bench: Bench
+) -> None:
+    stopping = bench.station.stopping
+    stopping.answered(
+        stopping.sent(at_ns=0), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True), 14_000_000
+    )
+    settle(around, bench)
+    (card,) = around.robots.cards
+    assert "confirmed by all 6 drives in 14 ms" in card._state._wordings[0]
+    assert "STOPPED 6/6 in 14 ms" in card._state._wordings

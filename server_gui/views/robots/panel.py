@@ -16,9 +16,11 @@ from PySide6.QtWidgets import (
 
 from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.confirmation import ask
 from server_gui.views.marks import SHORTER, age_text
 from server_gui.views.predictions import doing
@@ -93,7 +95,9 @@ class RobotCard(ClickableFrame):
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
         said = () if worst is None else (worst.brief, f"{mark.word}: {worst.spoken}" if worst.spoken else "")
-        short = SHORTER.get(mark.word, mark.word)
+        short, stopping = SHORTER.get(mark.word, mark.word), station.stopping
+        if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:
+            said = (*said, stopping.timed(f"{mark.word} {stopping.drives}/{stopping.drives}"))
         # One line: its STOP does not move with what is wrong.
         self._state.say(*filter(None, (*said, mark.word, short)))
         set_tip(self._state, "" if worst is None else worst.line)
