@@ -9,7 +9,7 @@ from server_gui.views.frame.main_window import MainWindow
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import fault, settle
-from tests.support.desk import JOINTS, described, looked, walking
+from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
 
 def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
@@ -84,6 +84,9 @@ def test_an_empty_list_says_what_to_do(around: Around, bench: Bench) -> None:
 def test_a_narrow_card_of_a_stopped_robot_says_by_how_many_drives_and_how_soon(
     around: Around, bench: Bench
 ) -> None:
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    now_ns = time.monotonic_ns()
+    bench.station.take([walking(10), looked(), telemetry([now_ns], states, now_ns)])
     stopping = bench.station.stopping
     stopping.answered(
         stopping.sent(at_ns=0), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True), 14_000_000

@@ -338,7 +338,7 @@ class Station:
         self._tell_stop()
 
     def _tell_stop(self) -> None:
-        self.tell(NewsKind.NOT_STOPPED if self.stopping.is_unproven else NewsKind.STOP, self.stopping.text)
+        self.tell(NewsKind.NOT_STOPPED if self.stopping.is_unproven else NewsKind.STOP, self.stopping.news)
 
     def _show_stop(self, event: Telemetry) -> None:
         """Update a running STOP from the drives' states."""

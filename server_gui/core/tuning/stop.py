@@ -280,6 +280,11 @@ class StopProgress:
         return f"{confirmed} in {max(1.0, *after_ms) if is_shown else self.answered_ms or 0:.0f} ms"
 
     @property
+    def news(self) -> str:
+        """What became of it, without a time: rows that come later may show a shorter one."""
+        return f"STOP confirmed by {self.every_drive}" if self.state is StopState.CONFIRMED else self.text
+
+    @property
     def proof(self) -> str:
         """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
