@@ -13,9 +13,9 @@ from ml.store.labels import Label
 from server_gui.core.archive.outline import Outline
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.flags import Flag
-from server_gui.views.marks import Mark, draw
+from server_gui.views.marks import draw
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.cursors import FIRST, FLAGS
+from server_gui.views.widgets.cursors import FLAGS, told
 from server_gui.views.widgets.plain import set_tip
 
 SECOND_NS: Final = 1_000_000_000
@@ -185,10 +185,7 @@ class Timeline(QWidget):
         painter.drawRect(bar)
         self._draw_ticks(painter, bar)
         self._draw_beside(painter, bar)
-        for flag in sorted(
-            self._flags, key=lambda one: FIRST.index(one.kind), reverse=True
-        ):  # the worst on top
-            self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)
+        self._draw_flags(painter, bar)
         x = self._x(self._position_ns)
         painter.setPen(QPen(self._theme.colour("text"), 2))
         painter.drawLine(QPointF(x, 0), QPointF(x, bar.bottom() + 2))
@@ -273,11 +270,12 @@ class Timeline(QWidget):
     def _is_within(self, flag: Flag) -> bool:
         return self._tape is not None and self._tape.first_ns <= flag.at_ns <= self._tape.last_ns
 
-    def _draw_mark(self, painter: QPainter, bar: QRectF, mark: Mark, at_ns: int) -> None:
+    def _draw_flags(self, painter: QPainter, bar: QRectF) -> None:
+        """As in the plots: where several have no room, the worst."""
         side = float(self._theme.px(11))
-        x = self._x(at_ns)
-        box = QRectF(x - side / 2, bar.top() - side - 1, side, side)
-        draw(painter, mark, self._theme.colour(mark.colour), box)
+        for x, kind in told([(self._x(flag.at_ns), flag.kind) for flag in self._flags], side):
+            mark, box = FLAGS[kind], QRectF(x - side / 2, bar.top() - side - 1, side, side)
+            draw(painter, mark, self._theme.colour(mark.colour), box)
 
     # --- where an instant is
 
