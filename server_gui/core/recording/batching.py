@@ -66,6 +66,7 @@ class Batching:
         self._link: int | None = None
         self._newest: dict[int, tuple[int, int, int]] = {}  # by stream: its newest `seq`, `dropped`, `shed`
         self._rested: set[int] = set()  # streams of which nothing came since nobody wanted it recorded
+        self._is_resting = False  # nothing of any stream has come since then
         self._gathered: dict[Name, tuple[Layout, list[Timed]]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
@@ -92,6 +93,7 @@ class Batching:
         offset_ns = self.clock.take(new.stream, batch.stamps_ns, new.clocks)
         events = [] if follows and not steps else self._happened(new, why, steps, offset_ns)
         self._newest[new.stream] = (batch.seq, batch.dropped, batch.shed)
+        self._is_resting = False
         if batch.stamps_ns:
             name = (self.session, self.connection, new.stream, id(layout))
             self._gathered.setdefault(name, (layout, []))[1].append((batch, offset_ns))
@@ -107,7 +109,7 @@ class Batching:
 
     def rest(self) -> None:
         """Call nothing of what comes until the next `take` missing: nobody wants it recorded."""
-        self._rested = set(self._newest)
+        self._rested, self._is_resting = set(self._newest), True
 
     def check(self, new: Notification) -> Layout:
         """Return how its rows are laid out; raises as `take` would, and changes nothing."""
@@ -189,7 +191,7 @@ class Batching:
     def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:
         if self._link is not None:
             self.connection = uuid.uuid4().hex[:16]
-            if not self._rested:
+            if not self._is_resting:
                 happened(EventKind.GAP, f"{why}; what was in between has not been seen")
         self._link = link
         self._newest.clear()

@@ -155,7 +155,7 @@ class StopProgress:
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
             if self._earlier is not None and set(self._earlier[-1]) == set(self._confirmed):
-                self._proven = self._earlier  # the robot was stopped by that one, and since then
+                self._proven, self._earlier = self._earlier, self._proven  # it was stopped by that one
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def failed(self, number: int, reason: str) -> None:
@@ -228,6 +228,9 @@ class StopProgress:
                 self.held, self.reason = False, ""
             elif self._is_ended_by_reset:
                 self.was_reset(held=False, at_s=_utc_s(entry))
+            elif self._earlier is not None and self.state is StopState.CONFIRMED:
+                self._proven, self._earlier = self._earlier, None  # it was reset since: only ours proves it
+                self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     @property
     def _is_ended_by_reset(self) -> bool:
@@ -265,10 +268,6 @@ class StopProgress:
         return replace(proof, after_ms=min(proof.after_ms, self.answered_ms))
 
     @property
-    def _slowest_ms(self) -> float:
-        return max([1.0, *(proof.after_ms for proof in self.proofs.values())])
-
-    @property
     def every_drive(self) -> str:
         return "the drive" if self.drives == 1 else f"all {self.drives} drives"
 
@@ -289,7 +288,7 @@ class StopProgress:
         """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
-        slowest = self._slowest_ms
+        slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))
         by_state: dict[str, list[str]] = {}
         for drive, proof in self.proofs.items():
             by_state.setdefault(proof.state, []).append(drive)

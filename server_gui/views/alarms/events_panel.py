@@ -93,11 +93,7 @@ class NewsModel(QAbstractTableModel):
         active = [_of_alarm(*told) for told in worst_first]
         alarms = {one.name: one.alarms for one in self._desk.stations}
         news = (
-            _of_item(
-                item,
-                item.title or self._titles.get(item.robot, item.robot),
-                event_mark(item, alarms.get(item.robot)),
-            )
+            _of_item(item, self._title(item), event_mark(item, alarms.get(item.robot)))
             for item in self._desk.news.items
             if item.kind in self._kinds
         )

@@ -6,12 +6,13 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
+from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
-from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
+from server_gui.views.marks import SHORTER, Mark, drives_mark, enabled_text, time_of_day
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.mark import MarkIcon
@@ -19,7 +20,6 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
-NOT_CONFIRMED: Final = Mark("square", "bad", "STOP NOT CONFIRMED")
 ON_TRIAL: Final = Mark("half", "warn", "on trial")
 
 
@@ -183,16 +183,14 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
-        return NOT_CONFIRMED, ("STOP NOT CONFIRMED", "NOT CONFIRMED"), (f"{known} · {count}", count)
+        led = TEXTS[Kind.NOT_STOPPED].mark
+        return led, (led.word, SHORTER[led.word]), (f"{known} · {count}", count)
     if not station.is_live:
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
     mark = drives_mark(station.robot)
     if station.stopping.held and mark.colour == "dim":  # off, and held so
-        return (
-            Mark("triangle", "warn", "STOPPED"),
-            _since(station),
-            (*_proven(station), f"{mark.word} · {count}", count),
-        )
+        details = (*_proven(station), f"{mark.word} · {count}", count)
+        return TEXTS[Kind.STOPPED].mark, _since(station), details
     return mark, (mark.word.capitalize(),), (count,)
 
 

@@ -1,6 +1,5 @@
 """A plot that is cheap to draw 30 times a second: pyqtgraph's axes, cached, around our own raster."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -17,6 +16,7 @@ from server_gui.core.desk.flags import FlagKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import CursorLayout, Cursors
+from server_gui.views.widgets.faint import faint
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
 from server_gui.views.widgets.value_axis import ValueAxis
@@ -26,7 +26,6 @@ SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only n
 MARGIN: Final = 0.06
 OLD: Final = 0.35  # opacity of what is not live
 NEAR_PX: Final = 4  # a press and a release no further apart are a click
-SEEN: Final = 3.2  # contrast of the faintest line: WCAG 2.2 asks of what is not text for 3
 NO_DATA: Final = "no data"
 
 
@@ -406,36 +405,6 @@ def ink(theme: Theme, curve: Curve) -> QColor:
     """Return the colour that a curve is drawn in: what is dashed stands back, and is seen all the same."""
     colour = theme.colour(curve.colour)
     return faint(colour, theme.colour("card")) if curve.dashed else colour
-
-
-def faint(colour: QColor, behind: QColor) -> QColor:
-    """Return the faintest mixture of both that has `SEEN` : 1 against what is behind it."""
-    shares = (share / 20 for share in range(6, 20))
-    mixed = (_mixed(colour, behind, share) for share in shares)
-    return next((one for one in mixed if contrast(one, behind) >= SEEN), colour)
-
-
-def _mixed(colour: QColor, behind: QColor, share: float) -> QColor:
-    pairs = zip(_parts(colour), _parts(behind), strict=True)
-    return QColor(*(round(share * one + (1 - share) * other) for one, other in pairs))
-
-
-def contrast(one: QColor, other: QColor) -> float:
-    """Return the contrast of two colours, by WCAG 2.2."""
-    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
-
-
-def _luminance(colour: QColor) -> float:
-    parts = (part / 255 for part in _parts(colour))
-    red, green, blue = (
-        part / 12.92 if part <= 0.04045 else math.pow((part + 0.055) / 1.055, 2.4) for part in parts
-    )
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
-def _parts(colour: QColor) -> tuple[int, int, int]:
-    return colour.red(), colour.green(), colour.blue()
 
 
 def css(theme: Theme, name: str) -> str:

@@ -193,3 +193,18 @@ def test_a_stop_of_somebody_else_is_held_also_if_it_is_older_than_ours() -> None
     before_ns = SENT_NS - 1_000_000_000
     stopping.read([at(1, "stop", before_ns, reason="door", who="ada")], BOOT)
     assert (stopping.stage, stopping.reason) == ((StopState.NOT_CONFIRMED, True), "door, by ada")
+
+
+def test_a_proof_of_before_a_reset_is_none_of_the_stop_after_it() -> None:
+    """Somebody had reset it in between, which was read later."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), ALL, SENT_NS + 95_000_000)
+    stopping.read([at(1, "stop", SENT_NS + 1_000_000)], BOOT)
+    again_ns = SENT_NS + 9_000_000_000
+    number = stopping.sent(off=ALL.drives, at_ns=again_ns, clock=CLOCK, boot_id=BOOT)
+    stopping.answered(number, ALL, again_ns + 4_000_000)
+    assert stopping.text.endswith("in 95 ms")
+    between_ns = SENT_NS + 5_000_000_000
+    stopping.read([at(2, "reset", between_ns, held=False), at(3, "stop", again_ns + 1_000_000)], BOOT)
+    assert stopping.stage == (StopState.CONFIRMED, True)
+    assert (stopping.at_ns, stopping.text.endswith("in 4 ms")) == (again_ns, True)

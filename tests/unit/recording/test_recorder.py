@@ -357,3 +357,15 @@ def test_what_comes_while_nobody_wants_it_recorded_is_no_gap(spool: Spool) -> No
         recorder.record("exo-01", 1, batch(3, missed=2, link=2))
     (gap,) = events(spool, "gap")
     assert json.loads(str(gap["data"]))["missed"] == 2
+
+
+def test_a_stream_that_comes_no_more_after_a_rest_hides_no_link_that_was_lost(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.begin("exo-01", Facts())
+        for stream in (1, 2):
+            recorder.record("exo-01", stream, batch(0))
+        recorder.end("exo-01")
+        recorder.begin("exo-01", Facts())
+        recorder.record("exo-01", 1, batch(1))
+        recorder.record("exo-01", 1, batch(0, link=2))
+    assert len(events(spool, "gap")) == 1
