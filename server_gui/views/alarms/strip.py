@@ -3,9 +3,9 @@
 import time
 from typing import Final
 
-from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import MORE
 from server_gui.core.alarms.texts import Kind
@@ -102,11 +102,6 @@ class AlarmStrip(ClickableFrame):
         self.buttons.acknowledge.setEnabled(time.monotonic() - self._changed_s >= HOLD_S)
         self.more.setVisible(bool(self.told))
         set_button(self.more, "Details …" if len(self.told) == 1 else f"All {len(self.told)} …")
-        for one in (
-            self,
-            self._words.widget(),
-        ):  # else a frame is drawn with the sizes of what was said before
-            QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
         self.list.refresh()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -82,7 +82,6 @@ class StatusBar(QStatusBar):
         self._window.say(*((*(f"{busy} · {rate}" for busy in FULL), rate) if is_full else (rate,)))
         set_tone(self._window, "warn" if is_full else "")
         set_tip(self._window, FRAMES_HINT)
-        QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)  # no number is drawn where it was
 
     def _refresh_recording(self, station: Station | None) -> None:
         address, is_live = (None, False) if station is None else (station.address, station.is_live)
