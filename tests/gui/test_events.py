@@ -128,3 +128,10 @@ def test_what_one_robot_did_stays_its_own_when_another_one_answers_at_its_addres
     bench.draw(around)
     (line,) = (one for one in around.events.lines if "STOP NOT" in one.text)
     assert line.robot.startswith("exo-01")
+
+
+def test_each_stop_is_an_event_of_its_own(around: Around, bench: Bench) -> None:
+    for _ in range(2):
+        bench.station.tell(NewsKind.STOP, "STOP confirmed by all 6 drives")
+    bench.draw(around)
+    assert [one.text for one in around.events.lines].count("STOP confirmed by all 6 drives") == 2

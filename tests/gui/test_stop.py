@@ -11,7 +11,7 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
-from gateway.client import ConnectionState, LinkLost, NotConnected
+from gateway.client import ClockOffset, ConnectionState, LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
@@ -267,12 +267,17 @@ def test_a_reset_from_before_ends_no_stop_that_is_not_confirmed() -> None:
     assert (stopping.state, stopping.held) == (StopState.NOT_CONFIRMED, False)
 
 
-def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> None:
-    stopping = StopProgress()
-    stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
-    stopping.read([{"n": 1, "what": "reset", "held": False}])
+@pytest.mark.parametrize("clock", [ClockOffset(0, 1000), None])
+def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it(clock: ClockOffset | None) -> None:
+    """By what was written since, as its clock says; where nobody can tell, not before the third look."""
+    stopping, sent_ns = StopProgress(), 10**12
+    number = stopping.sent(at_ns=sent_ns, clock=clock, boot_id="b")
+    stopping.answered(number, Stopped({"left_knee": "unreachable"}, held=True))
+    before, after = ({"boot_id": "b", "monotonic_ns": at_ns} for at_ns in (sent_ns // 2, sent_ns + 1))
+    stopping.read([{"n": 1, "what": "reset", "held": False, **before}])
     assert (stopping.state, stopping.held) == (StopState.NOT_CONFIRMED, True), "of a stop before ours"
-    stopping.read([{"n": 2, "what": "stop"}, {"n": 3, "what": "reset", "held": False}])
+    stopping.read([{"n": 2, "what": "write", **after}])
+    stopping.read([{"n": 3, "what": "stop", **after}, {"n": 4, "what": "reset", "held": False, **after}])
     assert (stopping.state, stopping.held) == (StopState.IDLE, False)
 
 

@@ -18,7 +18,7 @@ from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
-from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
 EVERY_OFF: Final = "every drive is off"
 STILL_MOVING: Final = "still moving: STOP again"
@@ -385,14 +385,14 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
 
 def undriven(robot: Robot, stopping: StopProgress) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
-    words = [(word or "").lower() for word in _words(robot).values()]
+    words = [None if word is None else word.lower() for word in _words(robot).values()]
     if stopping.held:
         return HELD
     if _QUICK_STOP in words:
         return STOPPING
     if any(word in _IN_FAULT for word in words):
         return IN_FAULT
-    return NONE_ENABLED if words and all(words) and ENABLED not in words else ""
+    return NONE_ENABLED if words and all(map(is_off, words)) else ""
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:

@@ -12,7 +12,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
 from server_gui.core.prediction.state import FEW, Quality
-from server_gui.core.tuning.stop import ENABLED
+from server_gui.core.tuning.stop import ENABLED, is_off
 
 NOT_SEEN: Final = ("lost", "stale")
 SOURCES: Final = {
@@ -64,9 +64,11 @@ def not_judged(station: Station) -> str:
 
 def _not_known(station: Station) -> str:
     """Return that too little is known of the drives: of those that are, none is enabled."""
-    words = [station.robot.word(f"{joint}.state") for joint in station.robot.names("joint")]
-    unknown = words.count(None)
-    if not 0 < unknown < len(words) or ENABLED in words:
+    robot = station.robot
+    told = [name for joint in robot.names("joint") if (name := f"{joint}.state") in robot.state_words]
+    words = [robot.word(channel) for channel in told]
+    unknown = sum(word != ENABLED and not is_off(word) for word in words)
+    if not unknown or ENABLED in words:
         return ""
     return f"{unknown} of {len(words)} drives not known, no other is enabled"
 

@@ -58,7 +58,7 @@ from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.reverted_trials import OVERDUE_S, RevertedTrials
-from server_gui.core.tuning.stop import ENABLED, Sent, StopProgress, StopState
+from server_gui.core.tuning.stop import Sent, StopProgress, StopState, is_off
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
@@ -260,7 +260,7 @@ class Station:
         if is_another:
             self.rings.clear()
             self.flags.clear()
-            self._states = StateWatch()
+            self._states, self.flash.clock = StateWatch(), None
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
         self.stopping.described(description.stop.held, description.stop.reason, is_anew=is_another)
         if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):
@@ -316,7 +316,7 @@ class Station:
         """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
         at_ns, future = time.monotonic_ns(), self._commands.stop(reason)
         joints = self.robot.names("joint") if self.is_live else ()
-        off = {joint for joint in joints if self.robot.word(f"{joint}.state") not in (None, ENABLED)}
+        off = {joint for joint in joints if is_off(self.robot.word(f"{joint}.state"))}
         return Sent(at_ns, future, off)
 
     def note_stop(self, sent: Sent) -> None:

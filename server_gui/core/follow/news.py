@@ -54,7 +54,8 @@ class Item:
 
     def __post_init__(self) -> None:
         """Find what repeats of it have in common: everything but the numbers in it."""
-        object.__setattr__(self, "key", (self.kind, self.title or self.robot, _NUMBER.sub("#", self.text)))
+        whose, said = f"{self.robot} {self.title}", _NUMBER.sub("#", self.text)
+        object.__setattr__(self, "key", (self.kind, whose, said))
 
 
 class News:
@@ -67,9 +68,10 @@ class News:
     def add(self, kind: NewsKind, robot: str, text: str, about: str = "", title: str = "") -> None:
         """Note something; what is told again within a minute is counted, what has not changed is not told."""
         item = Item(time.time(), kind, robot, text, about=about, title=title)
-        if self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
+        is_deed = kind in DONE  # which is told each time
+        if not is_deed and self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
             return
-        before = None if kind in DONE else next(self._lately(item), None)
+        before = None if is_deed else next(self._lately(item), None)
         if before is not None:
             self.items.remove(before)
             first_s = before.utc_s if before.first_s is None else before.first_s

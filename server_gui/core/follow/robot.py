@@ -1,6 +1,7 @@
 """Present state of one robot: events go in, views read it. No Qt, no threads."""
 
 import collections
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -195,7 +196,7 @@ class Robot:
     def word_of(self, channel: str, value: float | None) -> str | None:
         """Return the word of a state's number, None where there is none."""
         words = self._words.get(channel)
-        if value is None or words is None:
+        if value is None or words is None or not math.isfinite(value):
             return None
         return words.get(str(int(value)), str(int(value)))
 

@@ -17,6 +17,14 @@ AGAIN = "stopped again"  # while one is held: by somebody, or a drive by the gat
 CLOCKS_NS = 50_000_000  # that ours and a robot's are compared to
 
 
+LOOKS = 2  # at the journal: what comes later was written since the STOP
+
+
+def is_off(word: str | None) -> bool:
+    """Return whether a drive's state is known, and is not enabled; a number is of a state without a word."""
+    return word is not None and word != ENABLED and not word.isdecimal()
+
+
 class StopState(Enum):
     """State of the latest STOP."""
 
@@ -90,20 +98,11 @@ class StopProgress:
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
-    _earlier: "tuple[Any, ...] | None" = None  # of a STOP that was confirmed and held when this one was sent
     _clock: ClockOffset | None = None  # of the robot when it was sent
     _boot_id: str | None = None  # likewise
+    _reads: int = 0  # of the journal, since it was sent
     _entry: int = 0  # of the journal: the newest that was read
     _is_written: bool = True  # whether the latest STOP was read in the journal: resets before are older
-
-    @property
-    def _proven(self) -> tuple[Any, ...]:
-        """When a STOP was sent, and what has proven it."""
-        return self.at_ns, self.since_s, self.answered_ms, self.proofs, self._off, self._confirmed
-
-    @_proven.setter
-    def _proven(self, proven: tuple[Any, ...]) -> None:
-        self.at_ns, self.since_s, self.answered_ms, self.proofs, self._off, self._confirmed = proven
 
     @property
     def stage(self) -> tuple[StopState, bool]:
@@ -128,13 +127,13 @@ class StopProgress:
         repeats another that nobody has answered yet is timed from that.
         """
         self.number += 1
-        if self.state is not StopState.SENT:
-            is_again = self.held and self.state is StopState.CONFIRMED and set(off) >= set(self._confirmed)
-            self._earlier = self._proven if is_again else None
+        if self.state is StopState.SENT:
+            self._off = set(self._off) & set(off)
+        else:
             now_ns = time.monotonic_ns()
             self.at_ns = now_ns if at_ns is None else at_ns
             self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
-            self.proofs, self._off, self._clock, self._boot_id = {}, off, clock, boot_id
+            self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, off, clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
         self._confirmed, self.was_ended, self._is_written = (), False, False
         return self.number
@@ -154,8 +153,6 @@ class StopProgress:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
-            if self._earlier is not None and set(self._earlier[-1]) == set(self._confirmed):
-                self._proven, self._earlier = self._earlier, self._proven  # it was stopped by that one
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def failed(self, number: int, reason: str) -> None:
@@ -196,27 +193,40 @@ class StopProgress:
             if number <= self._entry:
                 continue
             self._entry = number
-            if not self._is_before(entry, boot_id):
+            if self._is_after(entry, boot_id):
                 self._read(entry, is_open=is_open)
             elif entry.get("what") in HELD_BY and not self.held:  # held still, as far as is read
                 self.held, self.reason, is_older = True, _said(entry), True
             elif is_older and _is_reset(entry):
                 self.held, self.reason, is_older = False, "", False
+        self._reads += 1
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since
 
-    def _is_before(self, entry: Mapping[str, Any], boot_id: str | None) -> bool:
-        """Return whether it is known to be older than our STOP, which was not read yet."""
-        is_ours_open = self.state is not StopState.IDLE and not self._is_written
-        if not is_ours_open or self.at_ns is None or self._boot_id is None:
-            return False
+    def _is_after(self, entry: Mapping[str, Any], boot_id: str | None) -> bool:
+        """Return whether an entry is no older than our STOP, whose own was not read yet.
+
+        Where nobody can tell, it is for a STOP that was confirmed, and is not for one that was not: neither
+        looks better for it. What comes with the third look has been written since.
+        """
+        if self.state is StopState.IDLE or self._is_written or self._reads >= LOOKS:
+            return True
         of = entry.get("boot_id")
-        if of != self._boot_id:
-            return of is not None and of != boot_id
+        if None not in (of, self._boot_id) and of != self._boot_id:
+            return of == boot_id
+        later_ns = self._later_ns(entry)
+        if later_ns is None:
+            return self.state is not StopState.NOT_CONFIRMED
+        return later_ns >= 0
+
+    def _later_ns(self, entry: Mapping[str, Any]) -> int | None:
+        """Return how much later than our STOP it was written at most; None where the clocks do not say."""
         written_ns, clock = entry.get("monotonic_ns"), self._clock
-        if clock is None or not isinstance(written_ns, int):
-            return False
-        return written_ns - clock.offset_ns < self.at_ns - CLOCKS_NS - clock.uncertainty_ns
+        if clock is None or clock.uncertainty_ns > CLOCKS_NS or self._boot_id is None or self.at_ns is None:
+            return None
+        if not isinstance(written_ns, int):
+            return None
+        return written_ns - clock.offset_ns - self.at_ns + CLOCKS_NS + clock.uncertainty_ns
 
     def _read(self, entry: Mapping[str, Any], *, is_open: bool) -> None:
         what = entry.get("what")
@@ -224,13 +234,10 @@ class StopProgress:
         if what in HELD_BY:
             self._holds(entry)
         elif _is_reset(entry):
-            if is_open:
-                self.held, self.reason = False, ""
-            elif self._is_ended_by_reset:
+            if self._is_ended_by_reset and not is_open:
                 self.was_reset(held=False, at_s=_utc_s(entry))
-            elif self._earlier is not None and self.state is StopState.CONFIRMED:
-                self._proven, self._earlier = self._earlier, None  # it was reset since: only ours proves it
-                self.text = self.timed(f"STOP confirmed by {self.every_drive}")
+            elif self.state is StopState.NOT_CONFIRMED:
+                self.held, self.reason = False, ""
 
     @property
     def _is_ended_by_reset(self) -> bool:
@@ -256,7 +263,7 @@ class StopProgress:
     ) -> None:
         for stamp_ns, word in zip(stamps_ns, words, strict=True):
             after_ms = (stamp_ns - offset_ns - at_ns) / 1e6
-            if after_ms >= 0.0 and word is not None and word != ENABLED:
+            if after_ms >= 0.0 and word is not None and is_off(word):
                 proof = Proof(0.0 if drive in self._off else after_ms, word)
                 self.proofs[drive] = self._earliest(drive, proof)
                 return
@@ -272,10 +279,15 @@ class StopProgress:
         return "the drive" if self.drives == 1 else f"all {self.drives} drives"
 
     def timed(self, confirmed: str) -> str:
-        """Return the confirmation with its time: the slowest drive's, or the answer's if rows lack one."""
-        found = [self.proofs.get(drive) for drive in self._confirmed]
-        after_ms = [one.after_ms for one in found if one is not None and not one.was_so]
-        is_shown = after_ms and None not in found
+        """Return the confirmation with its time: the slowest drive's, or the answer's if rows lack one.
+
+        None of drives that were off when it was sent: they say nothing of how soon it acts.
+        """
+        asked = [drive for drive in self._confirmed if drive not in self._off]
+        if not asked:
+            return f"{confirmed}, already off"
+        after_ms = [proof.after_ms for drive in asked if (proof := self.proofs.get(drive)) is not None]
+        is_shown = len(after_ms) == len(asked)
         return f"{confirmed} in {max(1.0, *after_ms) if is_shown else self.answered_ms or 0:.0f} ms"
 
     @property

@@ -57,6 +57,7 @@ class EventRow:
     text: str
     at: At | None = None
     utc_s: float | None = None  # of what is over
+    whose: str = ""  # the robot's name at the desk, which stays
 
 
 class NewsModel(QAbstractTableModel):
@@ -108,7 +109,7 @@ class NewsModel(QAbstractTableModel):
 
     def instant(self, line: EventRow) -> At | None:
         """Return where a line is seen in the signals; None: it is of no robot, or nothing came from it."""
-        station = next((one for one in self._desk.stations if one.title == line.robot), None)
+        station = next((one for one in self._desk.stations if one.name == line.whose), None)
         if line.at is not None or line.utc_s is None or station is None:
             return line.at
         newest_ns, age_s = station.rings.newest_ns, station.robot.age_s()
@@ -249,4 +250,4 @@ def _of_alarm(station: Station | None, one: Active) -> EventRow:
 def _of_item(item: Item, title: str, mark: Mark) -> EventRow:
     again = "" if item.first_s is None else f"  ({item.count} times since {time_of_day(item.first_s)})"
     text = f"{item.text}{again}"
-    return EventRow(time_of_day(item.utc_s), mark, title, text, utc_s=item.utc_s)
+    return EventRow(time_of_day(item.utc_s), mark, title, text, utc_s=item.utc_s, whose=item.robot)

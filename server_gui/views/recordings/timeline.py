@@ -15,7 +15,7 @@ from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.flags import Flag
 from server_gui.views.marks import draw
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.cursors import FLAGS, told
+from server_gui.views.widgets.cursors import FIRST, FLAGS, told
 from server_gui.views.widgets.plain import set_tip
 
 SECOND_NS: Final = 1_000_000_000
@@ -285,9 +285,8 @@ class Timeline(QWidget):
             return None
         near = self._theme.px(7)
         flags = [*self._flags, *filter(self._is_within, self._beside)]
-        found = ((abs(self._x(flag.at_ns) - place.x()), place_) for place_, flag in enumerate(flags))
-        distance, which = min(found, default=(near + 1, 0))
-        return flags[which] if distance <= near else None
+        pointed = [flag for flag in flags if abs(self._x(flag.at_ns) - place.x()) <= near]
+        return min(pointed, key=lambda flag: FIRST.index(flag.kind), default=None)  # as it is drawn
 
     def _since(self, flag: Flag) -> str:
         return clock_text(self._since_s(flag.at_ns), 1)
