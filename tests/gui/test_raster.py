@@ -101,6 +101,22 @@ def test_no_line_is_drawn_over_what_is_missing_between_two_columns() -> None:
     assert not seen[5:45].any()
 
 
+def test_a_bold_curve_grows_from_what_the_column_before_was_joined_to() -> None:
+    steps = [0.25, 0.375, 0.1875, *[0.25] * 7]
+    bold = np.array([np.nan, 0, 1, 0, 0, 0, 0, 0, 0, 0])
+    other = np.array([0.0, np.nan, 0, np.nan, np.nan, 0, np.nan, np.nan, 0, np.nan])
+    same_bit_by_bit(np.cumsum(steps), [bold, other], [5, 6], 7)
+
+
+def same_bit_by_bit(times: Floats, curves: list[Floats], ends: list[int], width: int) -> None:
+    view, inks = View(3.0, -1.0, 1.0, width, 50), Inks((INK, INK + 1), (False, True), 1)
+    bit_by_bit, at_once = Strip(), Strip()
+    for end in ends:
+        bit_by_bit.draw("robot", view, times[:end], [curve[:end] for curve in curves], inks)
+    at_once.draw("robot", view, times[: ends[-1]], [curve[: ends[-1]] for curve in curves], inks)
+    assert np.array_equal(unrolled(bit_by_bit), unrolled(at_once))
+
+
 @given(rises, st.data(), st.sampled_from([7, 40, 300]))
 def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
     steps: list[float], data: st.DataObject, width: int
@@ -110,12 +126,7 @@ def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
         np.array(data.draw(st.lists(heights, min_size=len(times), max_size=len(times)))) for _ in range(2)
     ]
     ends = sorted(data.draw(st.sets(st.integers(2, len(times)), min_size=1, max_size=6)))
-    view, inks = View(3.0, -1.0, 1.0, width, 50), Inks((INK, INK + 1), (False, True), 1)
-    bit_by_bit, at_once = Strip(), Strip()
-    for end in ends:
-        bit_by_bit.draw("robot", view, times[:end], [curve[:end] for curve in curves], inks)
-    at_once.draw("robot", view, times[: ends[-1]], [curve[: ends[-1]] for curve in curves], inks)
-    assert np.array_equal(unrolled(bit_by_bit), unrolled(at_once))
+    same_bit_by_bit(times, curves, ends, width)
 
 
 def test_another_robot_leaves_nothing_of_the_one_before() -> None:

@@ -94,8 +94,11 @@ class Strip:
     def _draw_from(
         self, first: int, view: View, times: Floats, curves: Sequence[Floats], inks: Inks, *, sampled: bool
     ) -> None:
-        """Draw the columns from `first` on; the column before them joins them to what is there."""
-        row = max(0, int(np.searchsorted(times, (first - 1) / view.scale)) - 1)
+        """Draw the columns from `first` on; the two before them join them to what is there.
+
+        A bold curve covers what the column before covers, and that begins where the one before it ended.
+        """
+        row = max(0, int(np.searchsorted(times, (first - 2) / view.scale)) - 1)
         times, values = times[row:], np.array([curve[row:] for curve in curves])
         if sampled:
             times, values = samples(times, values, view.scale, begins=row == 0)
