@@ -124,7 +124,7 @@ def rated(bus: BusInfo) -> list[Rated]:
     load, full = bus.load_percent or 0.0, []
     is_known = bus.load_percent is not None  # else what the gateway found a moment ago is all there is
     own = [one for one in bus.findings if not (is_known and one.words.endswith(TAKEN))]
-    if len(own) < len(bus.findings) or load >= (FULL_PERCENT if own else BUSY_PERCENT):
+    if len(own) < len(bus.findings) or load >= BUSY_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} {TAKEN}", fewer(bus))]
     warning, alarm = BusHealthLevel.WARNING, BusHealthLevel.ALARM
