@@ -18,6 +18,8 @@ from server_gui.terminal.keys import Key
 STEPS = 20  # from one end of a parameter's range to the other
 AGAIN_S = 3.0  # within which a reset is asked for twice
 SAID_S = 5.0  # for so long a refused key is told: what matters more comes back
+ENDS = "r again ends the held stop and clears faults: every drive is switched off, none is enabled"
+TAKES = "r again takes power from every drive, and a wearer's support (no held stop known)"
 
 
 class Controls:
@@ -127,12 +129,10 @@ class Controls:
         """End a held stop; a key that is hit by mistake does nothing."""
         if not self.asks_again:
             self._reset_until_s = time.monotonic() + AGAIN_S
-            self.note = (
-                "r again ends a held stop and clears faults: every drive is switched off, none is enabled"
-            )
+            self.note = ENDS if self._station.stopping.held else TAKES
             return
         self._reset_until_s = 0.0
-        self.note = "ending the held stop …"
+        self.note = "resetting …"
         self._station.reset()
 
     def _quit(self) -> None:

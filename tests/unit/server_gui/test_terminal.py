@@ -134,6 +134,16 @@ def test_what_a_stop_comes_to_is_waited_for_before_the_end() -> None:
     assert controls.is_over
 
 
+def test_what_a_reset_does_is_said_by_whether_a_stop_is_held() -> None:
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.STOP)
+    asked.answer(Stopped({"left_knee": "confirmed"}, True))
+    controls.press(Key.RESET)
+    assert "r again ends the held stop" in screen(station, controls)
+
+
 def test_a_reset_needs_the_key_twice_within_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 100.0
     monkeypatch.setattr("server_gui.terminal.controls.time.monotonic", lambda: now_s)
@@ -141,7 +151,7 @@ def test_a_reset_needs_the_key_twice_within_seconds(monkeypatch: pytest.MonkeyPa
     station = a_station(asked)
     controls = Controls(station)
     controls.press(Key.RESET)
-    assert "r again ends a held stop" in screen(station, controls)
+    assert "r again takes power from every drive" in screen(station, controls)
     now_s += 10.0
     controls.press(Key.RESET)
     assert asked.named("reset") == []
