@@ -33,6 +33,9 @@ class UnknownName(ClientError):
     """A channel or parameter that the robot does not have."""
 
 
+YES: Final = "say --yes to go on"
+
+
 class NobodyToAsk(Exception):
     """A question before a change, and no terminal."""
 
@@ -173,7 +176,7 @@ def ask(question: str, *, yes: bool) -> bool:
     if yes:
         return True
     if not sys.stdin.isatty():
-        raise NobodyToAsk("there is no terminal to ask on, and nothing was sent; say --yes to go on")
+        raise NobodyToAsk(f"{plain(question)} There is no terminal to ask on, and nothing was sent; {YES}")
     sys.stderr.write(plain(question, "\n") + YES_OR_NO)  # a program's answer is on the standard output
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")

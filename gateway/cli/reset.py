@@ -5,8 +5,9 @@ import contextlib
 from gateway.amounts import NONE
 from gateway.cli.connect import ask, connect, parser
 from gateway.cli.text import say, say_json, table, warn
-from gateway.client import ClientError, Robot
+from gateway.client import ClientError, RemoteError, Robot
 from gateway.wire.component import ChannelInfo
+from gateway.wire.framing import ErrorKind
 from gateway.wire.robot import Description
 from gateway.wire.stop import Reset
 
@@ -15,7 +16,10 @@ one that held its position releases it. Nothing is enabled: the controller or gw
 that. The stop stays held until every drive is known to be without current, and every controller
 to be stopped; otherwise the reason is named. Where no stop is held and drives are under power, or one's
 state is not known, the command asks first: they lose their power."""
-LOSES = "no stop is held, and under power are: {}. A reset stops them and takes their power. Go on?"
+LOSES = (
+    "no stop is held, and under power, or not known, are: {}. A reset stops them and takes their power, "
+    "and a wearer the robot's support. Go on?"
+)
 POWERED = frozenset({"switched on", "operation enabled", "quick stop active", "fault reaction active"})
 
 
@@ -46,9 +50,18 @@ def _powered(robot: Robot) -> list[str]:
     """Return the drives that may hold their joint while no stop is held; none where the robot does not tell.
 
     Then it is reset all the same: a reset enables nothing, and a fault has to be cleared.
+
+    Raises:
+        RemoteError: of a robot that is not served, and why.
+
     """
-    with contextlib.suppress(ClientError):
+    try:
         description = robot.describe()
+    except ClientError as error:
+        if isinstance(error, RemoteError) and error.kind == ErrorKind.UNAVAILABLE:
+            raise
+        return []
+    with contextlib.suppress(ClientError):
         return [] if description.stop.held else _with_power(robot, description)
     return []
 

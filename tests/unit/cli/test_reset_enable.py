@@ -58,7 +58,7 @@ def test_a_reset_that_takes_power_needs_a_yes_and_asks_beside_what_programs_read
     monkeypatch.setattr("sys.stdin", Terminal(answer))
     assert run(powered, "reset", "--json") == 1 - resets
     said = capsys.readouterr()
-    assert "under power are: left_hip, left_knee," in said.err
+    assert "under power, or not known, are: left_hip, left_knee," in said.err
     assert len(powered.called("robot.reset")) == resets
     told = json.loads(said.out)
     if resets:
@@ -75,7 +75,7 @@ def test_a_question_shows_letters_that_would_command_the_terminal_as_what_they_a
     monkeypatch.setattr("sys.stdin", Terminal("n\n"))
     assert run(powered, "reset") == 1
     said = capsys.readouterr().err
-    assert "under power are: left" in said
+    assert "under power, or not known, are: left" in said
     assert "\x1b" not in said
 
 
@@ -127,11 +127,23 @@ def test_a_look_that_fails_does_not_keep_a_fault_from_its_reset(
     powered: FakeRobot, method: str, answer: object
 ) -> None:
     def refuse(_params: object) -> object:
-        raise Refusal(-32010, "no module answers", kind="unavailable")
+        raise Refusal(-32010, "no module answers", kind="device_timeout")
 
     powered.overrides[method] = refuse if answer is None else lambda _params: answer
     assert run(powered, "reset") == 0
     assert len(powered.called("robot.reset")) == 1
+
+
+def test_a_robot_that_is_not_served_says_why_and_is_not_reset(
+    powered: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(_params: object) -> object:
+        raise Refusal(-32010, "robot.toml: [robot] name: is missing", kind="unavailable")
+
+    powered.overrides["robot.describe"] = refuse
+    assert run(powered, "reset") == 1
+    assert "robot.toml: [robot] name: is missing" in capsys.readouterr().err
+    assert powered.called("robot.reset") == []
 
 
 def test_a_reset_that_was_told_yes_looks_at_nothing_first(powered: FakeRobot) -> None:
