@@ -5,7 +5,6 @@ Like every stop it can enable nothing (`drivers.joint.commands`). It is software
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +23,7 @@ from gateway.commission.draft import Draft
 
 WITHIN_S = 1.5  # for a drive to confirm it
 MOST_AXES = 8  # of a node (CiA 402-2)
-OTHERS = "the draft tells of no drive: others than those of the robot's file may be on the bus"
+OTHERS = "draft and robot's file do not tell of every drive: others may be on the bus"
 EVERY_NODE = range(1, 128)
 
 
@@ -70,19 +69,20 @@ class Stopped:
 def stop(bench: CanBench, draft: Draft) -> Stopped:
     """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
 
-    Known are those that were found until now, and the joints of the robot's file. Of a draft in which
-    nothing is found yet, or that cannot be read, all node ids are asked, too.
+    Known are those that were found until now, and the joints of the robot's file. While there is a draft all
+    node ids are asked, too: it may not tell of every drive.
 
     Raises:
         DriverError: the bus does not open.
 
     """
-    found_until_now = set(axes_of(draft))
-    known = found_until_now | set(_axes_in(draft.file))
-    is_open = not found_until_now and draft.path.exists()
-    found = _stopped(bench, known, every=is_open)
-    problem = OTHERS if is_open and known else ""
-    return Stopped({str(axis): outcome for axis, outcome in found.items()}, problem)
+    drafted, written = set(axes_of(draft)), _axes_in(draft.file)
+    known = drafted | (written or set())
+    found = _stopped(bench, known, every=draft.path.exists())
+    is_open = (not drafted and draft.path.exists()) or written is None
+    return Stopped(
+        {str(axis): outcome for axis, outcome in found.items()}, OTHERS if is_open and known else ""
+    )
 
 
 def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
@@ -124,11 +124,15 @@ def axes_of(draft: Draft) -> Iterator[Axis]:
             yield Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0))
 
 
-def _axes_in(file: Path) -> Iterator[Axis]:
-    """Yield the joints of a robot's file; of one that is not there, or says nothing of use, none."""
-    with suppress(OSError, ValueError, msgspec.MsgspecError):
+def _axes_in(file: Path) -> set[Axis] | None:
+    """Return the joints of a robot's file; None where there is one, and it does not say them."""
+    if not file.exists():
+        return set()
+    try:
         joints = msgspec.toml.decode(file.read_bytes(), type=_File).joint
-        yield from (Axis(one.node_id, one.axis) for one in joints.values())
+    except (OSError, ValueError, msgspec.MsgspecError):
+        return None
+    return {Axis(one.node_id, one.axis) for one in joints.values()}
 
 
 def _request(axis: Axis) -> bytes:
