@@ -53,11 +53,13 @@ class Daemon:
         *,
         ends_idle: bool = False,
         rested_without_keys: bool = False,
+        refusal: framing.RpcError | None = None,
     ) -> None:
         """`classic` is where the paper's own exchange is served, `local` a Unix socket.
 
         With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`. Where
-        it has `rested_without_keys`, it is served without them again.
+        it has `rested_without_keys`, it is served without them again. With a `refusal`, everything but a
+        stop is answered with that.
 
         Raises:
             UnsafeListener: one of these sockets must not be served.
@@ -76,6 +78,7 @@ class Daemon:
         self._told = False
         self._tidying = False
         self._ends_idle = ends_idle
+        self._refusal = refusal
         self._idle: Timer | None = None
         self._sockets = [listener] if local is None else [listener, local]
         folder = AccessFolder(config.access)
@@ -168,9 +171,8 @@ class Daemon:
             return
 
         def session(refusal: framing.RpcError | None) -> Session:
-            return Session(
-                self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, self._sharing, refusal
-            )
+            wait_s, told = self._config.gateway.stuck_s, refusal or self._refusal
+            return Session(self._loop, inlet, self._service.handle, wait_s, self._sharing, told)
 
         address = inlet.peer.rpartition(":")[0]
         opened = self._places.admit(address, session)

@@ -29,6 +29,9 @@ from gateway.wire import framing
 
 log = logging.getLogger(__name__)
 
+VALID = "GWRMS_VALID_FILE"  # in the environment of a gateway at rest: the robot's file as it was valid last
+MOST_KEPT = 100_000  # bytes of it; Linux takes 128 KiB
+
 _DESCRIPTION = """\
 Serves one robot over TCP: joints over CANopen, insoles and IMU over serial ports, and
 the computer's own CPU, memory and processes.
@@ -87,13 +90,18 @@ def main(arguments: Sequence[str]) -> int:
     except SystemExit as ended:  # argparse has said why
         return ended.code if isinstance(ended.code, int) else 2
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    handed = inherited(os.environ)
+    handed, valid, refusal = inherited(os.environ), os.environ.pop(VALID, ""), None
     try:
         robot = _robot(options, tell=handed is None or not handed.woken)
+        valid = _text(options.config)
     except config.ConfigError as error:
         if handed is None:
             raise
-        return _refuse(handed, error)
+        if not valid:
+            return _refuse(handed, error)
+        log.error("%s", error)  # a stop is carried out all the same
+        robot = _as_told(config.load_text(options.config, valid), options)
+        refusal = framing.refuse(framing.ErrorKind.UNAVAILABLE, str(error))
     share_heap()
     sockets = _listeners(robot, handed)
     by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()
@@ -106,12 +114,13 @@ def main(arguments: Sequence[str]) -> int:
             local=sockets.local,
             ends_idle=idle,
             rested_without_keys=sockets.without_keys,
+            refusal=refusal,
         )
     except (UnsafeListener, KeyProblem) as error:
         if handed is None:
             sockets.close()
             raise
-        return _refuse(handed, error)
+        return _refuse(handed, error, valid)
     if watched is not None:
         daemon.repeat(watched / 2, lambda: systemd_notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
@@ -119,8 +128,16 @@ def main(arguments: Sequence[str]) -> int:
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         if by_hand and not daemon.told:
-            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys))
+            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys), {VALID: valid})
     return 0
+
+
+def _text(file: Path) -> str:
+    """Return the robot's file, as far as it can be kept: where it is broken meanwhile, a stop needs it."""
+    with contextlib.suppress(OSError, ValueError):
+        text = file.read_text(encoding="utf-8")
+        return text if len(text.encode()) <= MOST_KEPT else ""
+    return ""
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
@@ -131,6 +148,11 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
     robot, warnings = config.load_with_warnings(options.config)
     for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
+    return _as_told(robot, options)
+
+
+def _as_told(robot: config.RobotConfig, options: argparse.Namespace) -> config.RobotConfig:
+    """Return it with what the command line says otherwise."""
     given = {"host": options.host, "port": options.port}
     changed = {key: value for key, value in given.items() if value is not None}
     return replace(robot, gateway=replace(robot.gateway, **changed))
@@ -184,7 +206,7 @@ def _local(robot: config.RobotConfig) -> socket.socket | None:
     return None
 
 
-def _refuse(handed: Listeners, error: Exception) -> int:
+def _refuse(handed: Listeners, error: Exception, valid: str = "") -> int:
     """Tell everybody who has come from this computer why they are not served; where it was woken, rest again.
 
     Whoever comes from elsewhere is told nothing: nobody knows who that is.
@@ -200,7 +222,7 @@ def _refuse(handed: Listeners, error: Exception) -> int:
                     if listener.family == socket.AF_UNIX or is_loopback(listener.getsockname()):
                         connection.send(line)
     if handed.woken:
-        rest(handed)
+        rest(handed, {VALID: valid})
     return 1
 
 

@@ -28,7 +28,7 @@ from gateway.config.robot import (
 from gateway.config.stop import StopSettings
 from gateway.tables.decoding import Decoding
 from gateway.tables.finding import Finding, in_order, lines, mistakes, unknown
-from gateway.tables.reading import Unreadable, read
+from gateway.tables.reading import Unreadable, parse, read
 
 Table = Mapping[str, Any]
 
@@ -80,6 +80,14 @@ def load_with_warnings(path: Path) -> tuple[RobotConfig, list[Finding]]:
     if found.config is None:
         raise ConfigError(lines(path, mistakes(found.findings)))
     return found.config, found.findings
+
+
+def load_text(path: Path, text: str) -> RobotConfig:
+    """Return the robot of a text that the file once was, and that was valid; raises `ConfigError`."""
+    found = examined(path, parse(text.encode()))
+    if found.config is None:
+        raise ConfigError(lines(path, mistakes(found.findings)))
+    return found.config
 
 
 def examine(path: Path) -> Examined:

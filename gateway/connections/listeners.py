@@ -9,9 +9,10 @@ import os
 import re
 import socket
 import sys
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from gateway.own_folders import is_served
 from gateway.process import resting
@@ -140,11 +141,11 @@ def _adopted(descriptor: int) -> socket.socket:
     return adopted
 
 
-def rest(listeners: Listeners) -> None:
+def rest(listeners: Listeners, kept: Mapping[str, str] = MappingProxyType({})) -> None:
     """Become a small process that waits at the sockets, and this program again when somebody comes.
 
-    Never returns; what is not inheritable is closed. Signals are to be blocked before: what comes meanwhile
-    is then met by the one who waits.
+    That finds what is `kept` in its environment. Never returns; what is not inheritable is closed. Signals
+    are to be blocked before: what comes meanwhile is then met by the one who waits.
 
     Raises:
         OSError: the interpreter cannot be started.
@@ -157,6 +158,7 @@ def rest(listeners: Listeners) -> None:
     environ = {
         "MALLOC_ARENA_MAX": "1",  # of glibc: the threads of so small a process need no memory of their own
         **os.environ,
+        **kept,
         _NUMBER: str(len(spare)),
         _PROCESS: str(os.getpid()),
         _NAMES: ":".join(listeners.named),

@@ -95,13 +95,27 @@ def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running,
     until(lambda: processes.rests(running.pid), "it rests")
     file.write_text("[robot]\n", encoding="utf-8")
     with Client(address) as client:
-        message = client.line()
-        assert message is not None
-        assert message["error"]["message"] == f"{file}: [robot] name: is missing"
+        assert str(client.refused("robot.describe")) == f"{file}: [robot] name: is missing"
     file.write_text(processes.RESTS_SOON, encoding="utf-8")
     until(lambda: processes.rests(running.pid), "it rests again")
     with Client(address) as client:
         assert client.call("clock.read")
+
+
+def test_a_stop_is_carried_out_though_the_file_was_broken_meanwhile(running: Running, tmp_path: Path) -> None:
+    """A key that was mistyped while it rested had every stop refused: the robot walked on."""
+    address, file = processes.address(running), tmp_path / "robot.toml"
+    for broken in ("[robot]\n", "[[[ no TOML", None):
+        until(lambda: processes.rests(running.pid), "it rests")
+        if broken is None:
+            file.unlink()
+        else:
+            file.write_text(broken, encoding="utf-8")
+        with Client(address) as client:
+            assert client.refused("robot.describe").kind == "unavailable"
+    until(lambda: processes.rests(running.pid), "it rests again, and still knows the file that was valid")
+    with Client(address) as client:
+        assert client.call("robot.stop")["held"] is True
 
 
 # Where the robot's first desk is let in meanwhile
