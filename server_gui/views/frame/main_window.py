@@ -53,6 +53,7 @@ from server_gui.views.predictions import activity
 from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
+from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.visibility import has_focus_in, is_seen
@@ -117,6 +118,7 @@ class MainWindow(QMainWindow):
         self.alarms.shown.connect(self.show_around)
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
+        self.stopped_all = StopAllBar(desk, theme)
         self.robots.added.connect(self.added)
         self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
@@ -186,6 +188,7 @@ class MainWindow(QMainWindow):
         self._pages.setCurrentIndex(1 if shown else 0)
         self.page_bar.setVisible(shown)
         self.header.refresh()
+        self.stopped_all.refresh()
         self.alarms.refresh()
         self._hold_header()
         self.robots.refresh()
@@ -206,7 +209,12 @@ class MainWindow(QMainWindow):
         station, page = self._desk.selected, self.tabs.currentIndex()
         if station is None:
             return self._pace.is_due((page, station))
-        about = (station.is_live, *station.stopping.stage, activity(station).mark.word)
+        about = (
+            station.is_live,
+            *station.stopping.stage,
+            activity(station).mark.word,
+            self._desk.stopped_all,
+        )
         return self._pace.is_due((page, station, *about))
 
     def show_signals(self, globs: Sequence[str]) -> None:
@@ -309,6 +317,7 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(above)
         top = _column(above)
         top.addWidget(self.header)
+        top.addWidget(self.stopped_all)
         top.addWidget(self.alarms)
         top.addWidget(self.page_bar)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea

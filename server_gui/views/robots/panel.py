@@ -35,6 +35,10 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
+ALL_HINT: Final = (
+    "Quick stop on every drive of every robot of the list (Shift+F12). It is software over a network, NOT a "
+    "safety-rated emergency stop: keep the hardware ones within reach."
+)
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -159,6 +163,8 @@ class RobotsPanel(QWidget):
         self.all_stop = StopButton()
         self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
+        self.all_stop.setToolTip(ALL_HINT)
+        self.all_stop.setAccessibleDescription(ALL_HINT)
         self.all_stop.stopped.connect(self.stop_all)
         self.all_stop.setEnabled(False)  # there is no robot yet
         everything = QVBoxLayout(self)
