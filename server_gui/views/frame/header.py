@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.robot_alarms import remedy
+from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
@@ -24,7 +25,7 @@ from server_gui.views.widgets.stop_button import StopButton
 STOP_MARKS: Final = {
     StopState.SENT: Mark("half", "warn", "sent"),
     StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
-    StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
+    StopState.NOT_CONFIRMED: TEXTS[Kind.NOT_STOPPED].mark,
 }
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."

@@ -74,7 +74,7 @@ class RobotCard(ClickableFrame):
         words.addWidget(self._name, 0, 1)
         words.addWidget(self.remove, 0, 2)
         for row, label in enumerate((self._where, self._state, self._doing, self._link), 1):
-            words.addWidget(label, row, 1, 1, 2)  # a state's own words have room
+            words.addWidget(label, row, 0, 1, 3)  # a state's own words have room
         column = QVBoxLayout(self)
         column.setContentsMargins(9, 7, 8, 7)
         column.setSpacing(5)
