@@ -98,7 +98,8 @@ class RobotCard(ClickableFrame):
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
-        said = () if worst is None else (worst.brief, f"{mark.word}: {worst.spoken}" if worst.spoken else "")
+        where = "" if worst is None or not worst.spoken or worst.spoken in mark.word else worst.spoken
+        said = () if worst is None else (worst.brief, f"{mark.word}: {where}" if where else "")
         short, stopping = SHORTER.get(mark.word, mark.word), station.stopping
         if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:
             said = (*said, stopping.timed(f"{mark.word} {stopping.drives}/{stopping.drives}"))
