@@ -15,6 +15,7 @@ from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
+from server_gui.core.alarms.simulated import is_simulated, without_wires
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
@@ -71,7 +72,7 @@ class Facts:
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
-    return load_first(_found(facts), first, len(facts.robot.parts))
+    return load_first(without_wires(_found(facts), facts.robot), first, len(facts.robot.parts))
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
@@ -116,15 +117,17 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=_after_stop(robot, stopping),
-            check=check_of(Kind.STOPPED, role=role_of(robot)),
+            check=_go_on(Kind.STOPPED, robot),
             since_s=stopping.since_s,
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
-        yield Alarm(
-            Kind.RESET, "", what, check=check_of(Kind.RESET, role=role_of(robot)), since_s=stopping.since_s
-        )
+        yield Alarm(Kind.RESET, "", what, check=_go_on(Kind.RESET, robot), since_s=stopping.since_s)
+
+
+def _go_on(kind: Kind, robot: Robot) -> str:
+    return check_of(kind, role=role_of(robot), simulated=is_simulated(robot))
 
 
 def _then(why: str) -> str:
@@ -295,6 +298,8 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
     what, advice = _advised(problem)
+    if problem.startswith("it reports ") and (found := _CODE.search(problem)) is not None:
+        what = said_of_missed(int(found[1], 16), what) if ";" not in what else what
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
     yield Alarm(
         kind,

@@ -7,8 +7,8 @@ from gateway.wire.stop import Reset
 from server_gui.core.alarms.texts import Kind, check_of
 
 
-def after_reset(reset: Reset, role: str | None = None) -> tuple[str, str]:
-    """Return what became of the stop; `role` is the gateway's on the bus.
+def after_reset(reset: Reset, role: str | None = None, *, simulated: bool = False) -> tuple[str, str]:
+    """Return what became of the stop; `role` is the gateway's on the bus of a robot, or a `simulated` one.
 
     And of drives that have not left fault, with why and what to do, else "".
     """
@@ -22,7 +22,7 @@ def after_reset(reset: Reset, role: str | None = None) -> tuple[str, str]:
             filter(None, ["no stop is held, but not every fault is cleared", _told(others)])
         ), in_fault
     done = "; ".join(filter(None, ["stop reset, every drive is off", _told(others)]))
-    return f"{done}; {check_of(Kind.RESET, role=role)}", ""
+    return f"{done}; {check_of(Kind.RESET, role=role, simulated=simulated)}", ""
 
 
 def without_answer(error: Exception) -> str:

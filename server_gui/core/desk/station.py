@@ -23,6 +23,7 @@ from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.robot_alarms import Facts, any_enabled, role_of
 from server_gui.core.alarms.robot_alarms import alarms as found
+from server_gui.core.alarms.simulated import is_simulated
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
@@ -128,6 +129,10 @@ class Station:
     @property
     def bus_role(self) -> str | None:
         return role_of(self.robot)
+
+    @property
+    def is_simulated(self) -> bool:
+        return is_simulated(self.robot)
 
     @property
     def title(self) -> str:
@@ -362,7 +367,7 @@ class Station:
                 self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
                 return
             self.stopping.was_reset(reset.held)
-            said, stays = after_reset(reset, self.bus_role)
+            said, stays = after_reset(reset, self.bus_role, simulated=self.is_simulated)
             self.tell(NewsKind.STOP, said)
             if stays:
                 self.tell(NewsKind.FAULT, stays)

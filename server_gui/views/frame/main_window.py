@@ -116,6 +116,7 @@ class MainWindow(QMainWindow):
         self.alarms = AlarmStrip(desk, theme, self._middle)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
+        self.alarms.resources.connect(self._show_resources)
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
         self.stopped_all = StopAllBar(desk, theme)
@@ -229,6 +230,11 @@ class MainWindow(QMainWindow):
         self.tabs.look_at(signals)
         signals.refresh()
         signals.show_around((channel,) if channel else (), at_ns)
+
+    def _show_resources(self, station: Station) -> None:
+        """Show what keeps a robot's computer busy."""
+        self._desk.select(station)
+        self.tabs.look_at(self.tabs.resources)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if self._commissioning is not None and self._commissioning.runs and not self._is_ending:

@@ -17,7 +17,7 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     """Ask whether a held stop is to be ended."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
-    text = f"{held}\n\n{DOES}\n\nAfterwards, {check_of(Kind.RESET, role=station.bus_role)}."
+    text = f"{held}\n\n{DOES}\n\nAfterwards, {_go_on(station)}."
     return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
 
 
@@ -25,11 +25,15 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
     """Ask whether faults are to be cleared: what is enabled loses its torque by it."""
     more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
-    check = check_of(Kind.RESET, role=station.bus_role)
+    check = _go_on(station)
     asked = "\n".join((f"Clear the fault of {station.title}?", *_faults(station)))
     text = f"{asked}\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
     return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
+
+
+def _go_on(station: Station) -> str:
+    return check_of(Kind.RESET, role=station.bus_role, simulated=station.is_simulated)
 
 
 def _faults(station: Station) -> Iterator[str]:
