@@ -296,7 +296,7 @@ class Commissioning:
         if self._stop_s is None or self.wish is None:
             return
         if self._stopped is not None:
-            self.problem = "" if self._stopped.confirmed else self._stopped.words
+            self.problem = "" if self._stopped.confirmed else self._stopped.why
             self._end_stop(Stage.STOPPED if self._stopped.confirmed else Stage.NOT_CONFIRMED)
             return
         self.stage, self.question, self._live = Stage.STOPPING, None, ()

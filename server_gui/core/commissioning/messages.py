@@ -8,6 +8,7 @@ from gateway.units import with_minus
 
 NOT_SAID: Final = "not known"
 CONFIRMED: Final = "confirmed"
+NOT_CONFIRMED: Final = "NOT CONFIRMED"
 ENTER: Final = " Then press Enter."
 
 
@@ -58,6 +59,11 @@ class StoppedMessage(msgspec.Struct, frozen=True):
     states: dict[str, str] = {}
     after_ms: dict[str, float] = {}
 
+    @property
+    def why(self) -> str:
+        """Why it is not confirmed, beside the words that it is not."""
+        return self.words.removeprefix(f"{NOT_CONFIRMED}: ")
+
     def has_confirmed(self, drive: str) -> bool:
         """Return whether this drive has."""
         return self.drives.get(drive) == CONFIRMED
@@ -73,7 +79,7 @@ class StoppedMessage(msgspec.Struct, frozen=True):
     def _when(self, drive: str, said: str) -> str:
         after_ms = self.after_ms.get(drive)
         if said != CONFIRMED:
-            return f"NOT CONFIRMED: {said}"
+            return f"{NOT_CONFIRMED}: {said}"
         return "confirmed" if after_ms is None else f"{max(after_ms, 1.0):.0f} ms"
 
 
