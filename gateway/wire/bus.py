@@ -27,11 +27,16 @@ class NodeInfo(Struct, frozen=True):
 
 
 class TalkInfo(Struct, frozen=True):
-    """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set."""
+    """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set.
+
+    Of its identifiers those with the most frames are named; bit 31 is set of one of 29 bits, bit 30 of a
+    remote request, as in SocketCAN.
+    """
 
     kind: str
     node_id: int | None  # None: they belong to no node
     frames_per_s: float
+    identifiers: list[int] = []
 
 
 class BusInfo(Struct, frozen=True):

@@ -19,6 +19,7 @@ from server_gui.core.processing.bus_health import (
     trouble,
     worst,
 )
+from server_gui.core.processing.bus_senders import fewer
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
@@ -105,6 +106,12 @@ def test_frames_of_no_node_are_said_to_take_most_of_a_bus() -> None:
     unlisted = TalkInfo("other", 12, 9000.0)
     _, wordings = worst(robot(replace(BUS, load_percent=24.0, talks=[*BUS.talks, unlisted])))
     assert wordings[0].endswith(" · 90 % of its frames are from node 12")
+
+
+def test_what_fills_a_bus_is_named_by_its_identifiers() -> None:
+    injected = TalkInfo("other", None, 9000.0, [0x7F0, 1 << 31 | 0x123, 1 << 30 | 0x182])
+    found = fewer(replace(BUS, load_percent=97.0, talks=[*BUS.talks, injected]))
+    assert "no known node (0x7F0, 0x00000123, 0x182 (remote request)): find what sends them" in found
 
 
 @pytest.mark.parametrize(
