@@ -34,7 +34,7 @@ _id_of = itemgetter(1)
 class Talk:
     """Frames of one kind; `node_id` is None where they belong to no node.
 
-    `identifiers` are those with the most frames, at most `NAMED`, with SocketCAN's flags (`drivers.bus.frames`).
+    `identifiers` are the `NAMED` with the most frames, with SocketCAN's flags (`drivers.bus.frames`).
     """
 
     kind: str

@@ -296,7 +296,7 @@ def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
         main(["keys", "pair", str(file), "--yes"])
     monkeypatch.setattr("sys.stdin", io.StringIO())
     assert main(["keys", "pair", str(file), "--port", "0"]) == 1
-    assert "There is no terminal to ask on" in capsys.readouterr().err
+    assert "there is no terminal to ask on" in capsys.readouterr().err
     assert not (tmp_path / "keys").exists()
 
 
