@@ -7,6 +7,7 @@ from gateway.wire.method import Method, Params
 from gateway.wire.role import Role
 
 CLOSED = "closed"  # a bus's state that is not open
+EXTENDED, REMOTE = 1 << 31, 1 << 30  # of an identifier: it has 29 bits; it is a remote request
 
 
 class NodeInfo(Struct, frozen=True):
@@ -29,7 +30,7 @@ class NodeInfo(Struct, frozen=True):
 class TalkInfo(Struct, frozen=True):
     """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set.
 
-    Of its identifiers those with the most frames are named; bit 31 is set of one of 29 bits, bit 30 of a
+    Of its identifiers those with the most frames are named; bit 31 is set in one of 29 bits, bit 30 in a
     remote request, as in SocketCAN.
     """
 

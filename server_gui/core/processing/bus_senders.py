@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.bus.frames import EXTENDED, REMOTE
-from gateway.wire.bus import BusInfo
+from gateway.wire.bus import EXTENDED, REMOTE, BusInfo
 
 OWN_KINDS: Final = frozenset({"EMCY", "TPDO", "SDO answer", "heartbeat"})  # that a node sends itself
 OTHER: Final = "other"  # of no kind that CiA 301 names
