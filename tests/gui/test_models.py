@@ -232,7 +232,10 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     whole.open("Models")
     page = whole.window.tabs.models
     click(page.new)
-    page.form.held_out.setText("s3")
+    whole.until(lambda: "Nobody is chosen" in page.form.said.text(), "said what is labelled")
+    (judge,) = page.form.judges.findItems("s3", Qt.MatchFlag.MatchExactly)
+    judge.setCheckState(0, Qt.CheckState.Checked)
+    whole.until(lambda: "Judged by s3" in page.form.said.text(), "said by whom it is judged")
     click(page.form.begin)
     (job,) = archive.models.jobs.jobs
     whole.draw()
