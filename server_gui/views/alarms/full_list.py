@@ -31,7 +31,7 @@ MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MORE: Final = "… more: rest the pointer here, or move it out of the list"
 LAYERS: Final = 4  # of layouts within layouts
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
-RESOURCES_HINT: Final = "What keeps the robot's computer busy, process by process"
+HINT_RESOURCES: Final = "What keeps the robot's computer busy, process by process"
 OVER: Final = Mark("ring", "dim", "over")
 
 
@@ -178,7 +178,7 @@ class AlarmButtons(QWidget):
         self.clear.setToolTip("Reset the drives' fault: they go to switch on disabled, none is enabled")
         self.show_signal = QPushButton("Show the signal ± 5 s")
         self.show_resources = QPushButton("Resources")
-        self.show_resources.setToolTip(RESOURCES_HINT)
+        self.show_resources.setToolTip(HINT_RESOURCES)
         self.acknowledge = QPushButton("Acknowledge")
         self.acknowledge.setToolTip("Mark as read: other alarms come before it until it is over")
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)

@@ -35,7 +35,7 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
-ALL_HINT: Final = (
+HINT_ALL: Final = (
     "Quick stop on every drive of every robot of the list (Shift+F12). It is software over a network, NOT a "
     "safety-rated emergency stop: keep the hardware ones within reach."
 )
@@ -188,8 +188,8 @@ class RobotsPanel(QWidget):
         self.all_stop = StopButton()
         self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
-        self.all_stop.setToolTip(ALL_HINT)
-        self.all_stop.setAccessibleDescription(ALL_HINT)
+        self.all_stop.setToolTip(HINT_ALL)
+        self.all_stop.setAccessibleDescription(HINT_ALL)
         self.all_stop.stopped.connect(self.stop_all)
         self.all_stop.setEnabled(False)  # there is no robot yet
         everything = QVBoxLayout(self)
