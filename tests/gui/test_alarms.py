@@ -1,10 +1,8 @@
 """Active alarms in sight: above the tabs, among the events, on cards; their buttons; robots that go."""
 
-import dataclasses
 import time
 
 import pytest
-from msgspec.structs import replace
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -34,7 +32,7 @@ from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.faulty import CAUSE, fault, settle
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
-from tests.support.desk import JOINTS, looked, resources, telemetry, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 WHY = "nothing was sent; 127.0.0.1:7420 did not answer hello within 5 s"
 
@@ -302,23 +300,6 @@ def test_a_fault_is_the_same_on_strip_card_header_and_events(around: Around, ben
     assert around.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
     assert CAUSE in around.alarms.headline.text()
     assert around.events.pinned[0].mark == bench.station.alarms.active[0].alarm.mark
-
-
-def test_an_alarm_of_a_busy_computer_leads_to_its_page_and_names_no_command(
-    window: MainWindow, bench: Bench
-) -> None:
-    """It said "gwrms blame", in a window that has a page for that."""
-    seen = resources()
-    snapshot = replace(seen.snapshot, cpu=replace(seen.snapshot.cpu, percent=97.0))
-    bench.look_again([dataclasses.replace(seen, snapshot=snapshot), looked(state="lost", problem="late")])
-    bench.draw(window)
-    strip = window.alarms
-    assert "gwrms blame" not in "\n".join(strip.texts)
-    assert "on the page Resources" in strip.texts[0]
-    assert strip.buttons.show_resources.isVisible()
-    strip.buttons.show_resources.click()
-    assert window.tabs.currentWidget() is not None
-    assert window.tabs.tabText(window.tabs.currentIndex()).replace("&", "") == "Resources"
 
 
 def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_says_who_loses_torque(

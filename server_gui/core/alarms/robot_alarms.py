@@ -117,16 +117,17 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=_after_stop(robot, stopping),
-            check=_go_on(Kind.STOPPED, robot),
+            check=go_on(Kind.STOPPED, robot),
             since_s=stopping.since_s,
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
-        yield Alarm(Kind.RESET, "", what, check=_go_on(Kind.RESET, robot), since_s=stopping.since_s)
+        yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
 
 
-def _go_on(kind: Kind, robot: Robot) -> str:
+def go_on(kind: Kind, robot: Robot) -> str:
+    """Return how to go on after a stop, as the robot's gateway may."""
     return check_of(kind, role=role_of(robot), simulated=is_simulated(robot))
 
 

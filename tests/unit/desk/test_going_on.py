@@ -6,6 +6,7 @@ from msgspec.structs import replace
 from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.overload import THEIRS, load_first
+from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.simulated import NO_WIRES, without_wires
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
@@ -34,7 +35,7 @@ def test_the_simulator_is_spoken_of_only_where_the_robot_is_one(kind: Kind) -> N
     for vendor, simulated in (("maxon motor ag", False), ("GWRMS", True)):
         parts = [replace(one, device={"node_id": 2, "vendor": vendor}) for one in known.components]
         station.take([Described(replace(known, components=parts))])
-        assert station.is_simulated is simulated
+        assert ("sim-fault" in go_on(kind, station.robot)) is simulated
 
 
 def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
@@ -55,5 +56,6 @@ def test_of_a_bus_an_overloaded_computer_is_checked_before_the_wiring() -> None:
 
 def test_the_answer_to_a_reset_says_so_too() -> None:
     reset = Reset({"left_knee": "switch on disabled"}, {}, held=False)
-    assert "controller again" in after_reset(reset, "observer")[0]
-    assert "gwrms enable" in after_reset(reset, "master")[0]
+    said, stays = after_reset(reset, check_of(Kind.RESET, role="observer"))
+    assert "controller again" in said
+    assert not stays
