@@ -7,13 +7,16 @@ from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.overload import THEIRS, load_first
 from server_gui.core.alarms.robot_alarms import go_on
-from server_gui.core.alarms.simulated import NO_WIRES, without_wires
+from server_gui.core.alarms.simulated import NO_WIRES, advised, without_wires
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.resetting import after_reset
 from server_gui.core.follow.events import Described
 from server_gui.core.follow.robot import Robot
 from tests.support.desk import Bench, described
+
+
+BUS = "check termination, wiring and bitrate"
 
 
 @pytest.mark.parametrize("kind", [Kind.RESET, Kind.STOPPED])
@@ -39,7 +42,7 @@ def test_the_simulator_is_spoken_of_only_where_the_robot_is_one(kind: Kind) -> N
 
 
 def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
-    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check="check termination, wiring and bitrate")
+    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check=BUS)
     for vendor, check in (("maxon motor ag", alarm.check), ("GWRMS", NO_WIRES)):
         robot, known = Robot(), described().description
         parts = [replace(one, device={"vendor": vendor}) for one in known.components]
@@ -48,8 +51,14 @@ def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
         assert one.check == check
 
 
+def test_of_a_simulated_robot_only_the_wiring_is_left_out_of_what_to_check() -> None:
+    said = f"see that the gateway runs; {BUS}; see the manual"
+    assert advised(said, simulated=False) == said
+    assert advised(said, simulated=True) == f"see that the gateway runs; {NO_WIRES}; see the manual"
+
+
 def test_of_a_bus_an_overloaded_computer_is_checked_before_the_wiring() -> None:
-    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check="check termination, wiring and bitrate")
+    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check=BUS)
     (one,) = load_first([alarm], (THEIRS,), 10)
     assert one.check == f"{THEIRS}; then {alarm.check}"
 
