@@ -79,7 +79,7 @@ def _drives(robots: Sequence[Stopped], left: Sequence[Stopped]) -> str:
     one_drive = confirmed == 1 and not every
     said = f"{confirmed}{every} {'drive' if one_drive else 'drives'} confirmed"
     if not confirmed:
-        return said
+        return said if every else ""
     return f"{said} in {max(after_ms):.0f} ms" if after_ms else f"{said}, already off"
 
 

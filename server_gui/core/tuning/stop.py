@@ -341,7 +341,7 @@ class StopProgress:
 
     def _not_confirmed(self, why: str) -> None:
         self.state, self.why = StopState.NOT_CONFIRMED, why
-        self.text = f"STOP NOT CONFIRMED: {why}. Use the hardware stop"
+        self.text = f"STOP NOT CONFIRMED: {why}{'' if why.endswith('?') else '.'} Use the hardware stop"
 
 
 def _said(entry: Mapping[str, Any]) -> str:

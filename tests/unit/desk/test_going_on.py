@@ -15,7 +15,6 @@ from server_gui.core.follow.events import Described
 from server_gui.core.follow.robot import Robot
 from tests.support.desk import Bench, described
 
-
 BUS = "check termination, wiring and bitrate"
 
 

@@ -75,6 +75,16 @@ def test_drives_of_a_robot_that_was_never_reached_are_not_counted_as_none(two: B
     assert "12/12" not in said(two), "nobody knows how many there are"
 
 
+def test_where_nothing_is_known_of_any_drive_none_is_counted(two: Bench) -> None:
+    two.desk.stop_all("test")
+    two.commands[0].answer(ALL)
+    two.commands[1].fail(NotConnected("no gateway there; is it running?"))
+    two.desk.stations[0].reset()
+    two.commands[0].answer(OFF)
+    assert said(two).startswith("STOP ALL: 0 of 2 robots stopped; exo-01 reset; exo-02 STOP NOT CONFIRMED")
+    assert two.desk.stations[1].stopping.text.endswith("is it running? Use the hardware stop")
+
+
 def test_one_drive_that_does_not_confirm_is_named_with_its_robot(two: Bench) -> None:
     two.desk.stop_all("test")
     two.commands[0].answer(ALL)
