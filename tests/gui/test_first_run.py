@@ -299,7 +299,7 @@ def test_stop_demo_and_tour_are_whole_on_small_screens(
 # --- the splash
 
 
-def test_the_splash_says_which_step_is_done_and_closes_when_the_robot_walks(
+def test_the_splash_says_which_step_is_done_and_ends_as_the_window_is_there_which_says_the_rest(
     qt: QApplication, theme: Theme, bench: Bench
 ) -> None:
     own, steps = Running(), FirstSteps()
@@ -315,10 +315,13 @@ def test_the_splash_says_which_step_is_done_and_closes_when_the_robot_walks(
     own.ready = (RobotPart.SIMULATOR, RobotPart.GATEWAY)
     opening.look(bench.desk.stations[0], window=True)
     assert steps.now is FirstStep.DATA  # nothing has come of the robot yet
-    assert splash.isVisible()
+    assert not splash.isVisible(), "it would lie over the window"
+    assert not opening.is_over
+    assert opening.words.endswith("Next: First data from every component")
     for step in FirstStep:
         steps.reach(step)
     opening.look(bench.desk.stations[0], window=True)
+    assert opening.is_over
     assert not splash.isVisible()
     destroy(splash)
 

@@ -4,7 +4,7 @@ from typing import Final
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
@@ -36,10 +36,10 @@ class Fact(QWidget):
             ShrinkingLabel("title"),
             ShrinkingLabel("dim"),
         )
-        words = QVBoxLayout()
+        self._words = words = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         words.setSpacing(0)
         words.addWidget(self.main)
-        words.addWidget(self.detail)
+        words.addWidget(self.detail, 1)
         self.row = QHBoxLayout(self)
         self.row.setContentsMargins(0, 0, 0, 0)
         self.row.setSpacing(8)
@@ -55,6 +55,13 @@ class Fact(QWidget):
         self.detail.say(*detail)
         self.setAccessibleDescription(f"{main[0]}, {detail[0]}")
         set_tip(self, "\n".join(filter(None, (main[0], detail[0], tip))))
+
+    def be_flat(self, is_flat: bool) -> None:
+        """Have both in one line, where there is little room."""
+        way = QBoxLayout.Direction.LeftToRight if is_flat else QBoxLayout.Direction.TopToBottom
+        if way is not self._words.direction():
+            self._words.setDirection(way)
+            self._words.setSpacing(8 if is_flat else 0)
 
     @property
     def wide(self) -> int:
@@ -104,6 +111,7 @@ class NowLine(QFrame):
         self._grid.setHorizontalSpacing(18)
         self._placed: tuple[int, bool] = (0, False)
         self._is_offered = True
+        self.is_flat = False
         self._arrange(2, on_trial=False)
 
     def minimumSizeHint(self) -> QSize:
@@ -117,6 +125,17 @@ class NowLine(QFrame):
         """Choose whether a trial is judged, kept or taken back here: not while its panel is in sight."""
         self._is_offered = wanted
         self._decide.setVisible(wanted and self._placed[1])
+
+    def be_flat(self, is_flat: bool) -> None:
+        """Have each fact in one line; what is on trial keeps its two."""
+        self.is_flat = is_flat
+        for fact in (self.drives, self.activity):
+            fact.be_flat(is_flat)
+
+    @property
+    def gain(self) -> int:
+        """How much lower it is where it is flat."""
+        return self.drives.detail.sizeHint().height()
 
     def refresh(self) -> None:
         """Show how it is now."""

@@ -39,11 +39,13 @@ from server_gui.views.widgets.pressure_map import PressureMap
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
-A_COLUMN: Final = 190  # wide at least, at text of 100 %
+A_COLUMN: Final = 178  # wide at least, at text of 100 %
+LOOKS: Final = 2  # at a new size of the window: with the first one, docks may be on their way still
+WORDS_SHARE: Final = 5  # of the joints' title line
 PICTURE_SHARE, PLOT_SHARE = 10, 9  # of the height
 SPARE: Final = 100  # high, likewise: so much must be left for lines and alarms that come
-PICTURE: Final = 146  # high at least, likewise: what the ring says is read
-PLOT: Final = 143  # high at least, likewise: 70 for its curves
+PICTURE: Final = 141  # high at least, likewise: what the ring says is read
+PLOT: Final = 142  # high at least, likewise: 70 for its curves
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
 OFF_N: Final = 50.0  # a figure that is further off than its picture is read at once
@@ -103,11 +105,10 @@ class Overview(QWidget):
         self._table = JointTable(self._model, theme)
         self._joints.body.addWidget(self._table)
         self._wrong = JointWords(theme)
-        self._joints.body.addWidget(self._wrong)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(6, 4, 6, 4)
+        self._grid.setContentsMargins(6, 3, 6, 3)
         self._grid.setHorizontalSpacing(6)
-        self._grid.setVerticalSpacing(5)
+        self._grid.setVerticalSpacing(4)
         self.sections = SectionBar(theme)
         self.sections.chosen.connect(self._choose)
         self._pages, self._page = ALL, ALL[0]
@@ -120,6 +121,7 @@ class Overview(QWidget):
             card.setParent(self)  # else it would be shown as a window of its own
         self._columns, self._is_plots, self._is_low = 0, False, False
         self._ordered_for: object = None
+        self._looks = 0  # at this size
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -137,8 +139,9 @@ class Overview(QWidget):
         As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
         """
         room = self.window().size(), self._theme.scale, self._model.rowCount(), self._columns
-        if room != self._ordered_for:
-            self._ordered_for = room
+        looks = 1 if room != self._ordered_for else self._looks
+        if looks <= LOOKS:
+            self._ordered_for, self._looks = room, looks + 1
             is_low, pages = self._is_too_low(), self._fitting_pages()
             if is_low is not self._is_low or pages != self._pages:
                 self._is_low, self._pages = is_low, pages
@@ -158,14 +161,15 @@ class Overview(QWidget):
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return ALL
-        bar, between = self.sections.sizeHint().height(), self._grid.verticalSpacing()
+        bar, between = self.sections.sizeHint().height() - self.now.gain, self._grid.verticalSpacing()
         return arranged(self._needs(), seen.height() - self._around, bar, between)
 
     @property
     def _around(self) -> int:
         """How high all is that is on every page."""
         margins = self._grid.contentsMargins()
-        return margins.top() + margins.bottom() + self.now.minimumSizeHint().height()
+        line = self.now.minimumSizeHint().height() + (self.now.gain if self.now.is_flat else 0)
+        return margins.top() + margins.bottom() + line
 
     def _needs(self) -> dict[Section, int]:
         """How high each section is at least (pixels)."""
@@ -205,7 +209,8 @@ class Overview(QWidget):
     def _arrange(self, columns: int) -> None:
         """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
-        self._wrong.be_high(1 if columns > 1 else 2)  # a line is enough for an error
+        self._place_words(columns)
+        self.now.be_flat(len(self._pages) > 1)
         self.sections.show_pages(ALL if self._is_plots else self._pages, self._page)
         grid.addWidget(self.now, 0, 0, 1, columns)
         grid.addWidget(self.sections, 1, 0, 1, columns)
@@ -230,6 +235,16 @@ class Overview(QWidget):
         grid.setRowStretch(9, 1 if is_alone else 0)
         for one in (self._joints, self):  # else a frame is drawn in which words lie over the table
             QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
+
+    def _place_words(self, columns: int) -> None:
+        """Put what is said of the joints into their title's line, or below the table where that is narrow."""
+        is_wide = columns == len(SHARES)
+        self._wrong.be_high(1 if columns > 1 else 2)  # a line is enough for an error
+        self._table.point_to_words(above=is_wide)
+        if is_wide:
+            self._joints.head.insertWidget(1, self._wrong, WORDS_SHARE)
+        else:
+            self._joints.body.addWidget(self._wrong)
 
     def _cards_of_page(self) -> list[Card]:
         """Return the cards of the page that stand beside each other; hide those of the others."""
