@@ -23,6 +23,7 @@ from server_gui.views.robots.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.faulty import fault
+from tests.gui.rules import settle
 from tests.gui.running import wait
 from tests.support.desk import walking
 
@@ -338,3 +339,20 @@ def test_a_start_that_fails_or_a_click_ends_the_splash(qt: QApplication, theme: 
     QTest.mouseClick(splash, Qt.MouseButton.LeftButton)
     assert not splash.isVisible()
     destroy(splash)
+
+
+def test_beside_the_demos_bar_a_small_laptop_shows_all_of_the_overview(
+    demo: Demo, window: MainWindow, bench: Bench
+) -> None:
+    window.resize(1366, 768)
+    bench.station.take([walking(300, age_s=-3600.0)])
+    for is_touring in (True, False):
+        for _ in range(3):
+            demo.draw()
+            settle()
+        assert demo.bar.tour.isVisible() is is_touring
+        assert demo.bar.said.isVisible() is not is_touring
+        assert demo.bar.height() <= 40
+        click(demo.bar.tour.skip)
+    assert window.tabs.overview.sections.isHidden()
+    assert min(plot.plot._lines.height() for plot in window.tabs.overview._plots) >= 70

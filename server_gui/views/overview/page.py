@@ -9,7 +9,7 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
 from server_gui.core.desk.confidence import not_judged
@@ -138,7 +138,9 @@ class Overview(QWidget):
 
         As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
         """
-        room = self.window().size(), self._theme.scale, self._model.rowCount(), self._columns
+        window, bars = self.window(), self.window().findChildren(QToolBar)  # the demo's
+        high = window.height() - sum(bar.height() for bar in bars if bar.isVisible())
+        room = window.width(), high, self._theme.scale, self._model.rowCount(), self._columns
         looks = 1 if room != self._ordered_for else self._looks
         if looks <= LOOKS:
             self._ordered_for, self._looks = room, looks + 1
