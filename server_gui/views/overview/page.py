@@ -163,7 +163,8 @@ class Overview(QWidget):
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return ALL
-        bar, between = self.sections.sizeHint().height() - self.now.gain, self._grid.verticalSpacing()
+        gain = self.now.gain if self._columns > 1 else 0
+        bar, between = self.sections.sizeHint().height() - gain, self._grid.verticalSpacing()
         return arranged(self._needs(), seen.height() - self._around, bar, between)
 
     @property
@@ -212,7 +213,7 @@ class Overview(QWidget):
         """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
         self._place_words(columns)
-        self.now.be_flat(len(self._pages) > 1)
+        self.now.be_flat(len(self._pages) > 1 and columns > 1)
         self.sections.show_pages(ALL if self._is_plots else self._pages, self._page)
         grid.addWidget(self.now, 0, 0, 1, columns)
         grid.addWidget(self.sections, 1, 0, 1, columns)
