@@ -6,6 +6,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
+from gateway.units import Units, rounded
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -146,7 +147,7 @@ class NowLine(QFrame):
         self._fit(on_trial=trial is not None)
         if station is None:
             return
-        self.drives.say(*_drives(station))
+        self.drives.say(*_drives(station, self._desk.shown.units))
         line = activity(station)
         gait = station.processing.derived().gait
         walks = (
@@ -198,7 +199,7 @@ class NowLine(QFrame):
             self._grid.setColumnStretch(column, 1 if column < columns else 0)
 
 
-def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
+def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
@@ -210,7 +211,20 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
-    return mark, (mark.word.capitalize(),), (count,)
+    return mark, (mark.word.capitalize(),), (*_warmest(station, units, count), count)
+
+
+def _warmest(station: Station, units: Units, count: str) -> tuple[str, ...]:
+    """Return which drive is the warmest, behind how many are enabled; nothing where none says so."""
+    told = {joint: station.robot.values.get(f"{joint}.temperature") for joint in station.robot.names("joint")}
+    known = {joint: value for joint, value in told.items() if value is not None}
+    if len(known) < 2:
+        return ()
+    joint = max(known, key=lambda one: known[one])
+    unit = units.unit("temperature", "°C")
+    return (
+        f"{count} · warmest: {joint.replace('_', ' ')} {rounded(known[joint] * unit.scale, 0)} {unit.symbol}",
+    )
 
 
 def _since(station: Station) -> tuple[str, ...]:
