@@ -88,9 +88,7 @@ def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, ben
     assert drives.detail.text() == "operation enabled · 6 of 6 enabled"
 
 
-def test_while_all_is_well_the_first_line_says_which_drive_is_the_warmest(
-    overview: Overview, bench: Bench
-) -> None:
+def test_the_first_line_says_which_drive_is_the_warmest(overview: Overview, bench: Bench) -> None:
     received_ns = time.monotonic_ns()
     columns: dict[str, list[float | None]] = {f"{joint}.temperature": [40.0] for joint in JOINTS}
     columns["right_knee.temperature"] = [61.4]

@@ -123,14 +123,14 @@ class Cursors(QWidget):
         for share in self._shown.limits:
             y = round(share * (self.height() - 1))
             painter.drawLine(0, y, self.width(), y)
-        side, right = self._theme.px(5), self.width() - 2
+        side = self._theme.px(5)  # at the left: the newest values are at the right
         painter.setPen(QPen(self._theme.colour("bad"), 1))
         for share in self._shown.beyond:  # an arrow at the edge behind which it is
             tip = round(share * (self.height() - 1))
             foot = tip + side if share < 0.5 else tip - side
-            painter.drawLine(right - 4 * side, tip, right, tip)
-            for x in (right - 3 * side, right - side):
-                painter.drawLine(right - 2 * side, tip, x, foot)
+            painter.drawLine(2, tip, 2 + 4 * side, tip)
+            for x in (2 + side, 2 + 3 * side):
+                painter.drawLine(2 + 2 * side, tip, x, foot)
 
     def _draw_flags(self, painter: QPainter) -> None:
         side = float(self._theme.px(9))
