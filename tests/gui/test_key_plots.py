@@ -161,7 +161,7 @@ def test_a_limit_beyond_the_range_is_an_arrow_at_its_edge_and_is_said_to_be_ther
     bench.station.take([telemetry(stamps_ns, columns, time.monotonic_ns() + round(HOUR_S * 1e9))])
     draw(overview)
     draw(overview)
-    assert torque.plot._marks._shown.beyond == (1.0,)
+    assert list(torque.plot._marks._shown.beyond) == [1.0]
     assert [glyph for _, glyph, text in torque.legend._parts if "80" in text] == ["┅"]
 
 
