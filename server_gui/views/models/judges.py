@@ -58,9 +58,9 @@ class Judges(QTreeWidget):
         item = QTreeWidgetItem(self, [plain(lesson.name), str(lesson.sessions), plain(lesson.said)])
         item.setTextAlignment(SESSIONS, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         item.setFont(SESSIONS, self._theme.number_font())
-        item.setToolTip(LABELLED, tip(lesson.said))
+        item.setData(LABELLED, Qt.ItemDataRole.ToolTipRole, tip(lesson.said))
         if not lesson.is_named:
-            item.setToolTip(NAME, tip(NAMELESS))
+            item.setData(NAME, Qt.ItemDataRole.ToolTipRole, tip(NAMELESS))
         if lesson.why_not:
             item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsUserCheckable & ~Qt.ItemFlag.ItemIsEnabled)
         else:
