@@ -25,6 +25,7 @@ def player(shown: Shown, archive: Archive, settings: ServerSettings) -> Player:
     """Both are marked and shown side by side, and stand still."""
     for _ in range(2):
         record(settings)
+    archive.library.look(now=True)
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")

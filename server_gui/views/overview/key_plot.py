@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.units import Unit, with_minus
+from gateway.wire.parameter import ParameterValue
+from server_gui.core.archive.playback import PlayedRobot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import row_at
 from server_gui.core.desk.station import Station
@@ -20,10 +22,12 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
+AT_START: Final = "limit at the start "
 LETTERS: Final = {"left": "L", "right": "R"}  # alone in their colours, as on the cards beside it
 AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a flag
 
 
+Wordings = tuple[tuple[str, Mapping[str, str]], ...]  # of the limit, and of the curves
 Part = tuple[str, str, str]  # of the legend: colour, what is drawn, what it says
 
 
@@ -108,7 +112,8 @@ class KeyPlot(Card):
             return [*curves, (css(self._theme, "bad"), "┅", f"{limit}{limits}")] if limits else curves
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
-        wordings: tuple[tuple[str, Mapping[str, str]], ...] = ("limit ", {}), ("", {}), ("", LETTERS)
+        whose = (AT_START, "start ") if _at_start(station) else ("limit ", "")
+        wordings: Wordings = (whose[0], dict[str, str]()), (whose[1], {}), (whose[1], LETTERS)
         fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
         self.legend.say(parts(told.values(), *next(fits, wordings[1])))
         self.plot.setAccessibleDescription(
@@ -162,8 +167,9 @@ class KeyPlot(Card):
         known = (
             () if not wanted or station.robot.description is None else station.robot.description.parameters
         )
+        of_now = station.robot.parameters or _at_start(station)
         held = [
-            station.robot.parameters.get(info.name)
+            of_now.get(info.name)
             for info in known
             if info.component in parts
             and info.object.lower().startswith(wanted)
@@ -177,6 +183,11 @@ class KeyPlot(Card):
 
     def _resize(self) -> None:
         self.plot.setMinimumHeight(self._theme.px(48))
+
+
+def _at_start(station: Station) -> Mapping[str, ParameterValue]:
+    """Return the parameters of a recording's start, where nobody knows of later changes."""
+    return station.robot.at_start if isinstance(station.robot, PlayedRobot) else {}
 
 
 def _limit_texts(limits: Sequence[float], unit: Unit) -> str:

@@ -21,11 +21,10 @@ from gateway.plain_text import plain
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.cycle_remarks import CycleRemarks
-from server_gui.core.archive.playback import SPEEDS, PlayedRobot
+from server_gui.core.archive.playback import SPEEDS, Playback, PlayedRobot
 from server_gui.core.archive.recorded_notes import RecordedNotes
 from server_gui.core.archive.recording_names import short_names
 from server_gui.core.archive.side_by_side import SideBySide
-from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
@@ -76,7 +75,7 @@ class Player(QWidget):
         self._theme = theme
         self._frame = 0
         self._worded = 0, False  # the instant of which the words are, and whether it was being read
-        self._told: dict[TimelineEvents, object] = {}  # the recording and the journal that it knows of
+        self._told: dict[Playback, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
@@ -347,20 +346,22 @@ class Player(QWidget):
         self._archive.journals.look()
         for playback in (self._playback, self.beside.second):
             if playback.tape is not None:
-                self._tell(playback.happened, playback.tape)
+                self._tell(playback, playback.tape)
         flags = tuple(self._playback.happened.flags), tuple(self.beside.flags)
         if flags != self._flags:
             self._flags = flags
             names = self.signals.scene.names
             self.timeline.show_flags(*flags, "" if names is None else names[1])
 
-    def _tell(self, happened: TimelineEvents, tape: Tape) -> None:
+    def _tell(self, playback: Playback, tape: Tape) -> None:
         """Tell it what the robot's journal has of that time."""
         journals = self._archive.journals
         kept, told = journals.found.by_robot.get(tape.session.robot), (tape, journals.revision)
-        if kept is not None and self._told.get(happened) != told:
-            self._told[happened] = told
-            happened.tell(entry for stretch in kept.stretches for entry in stretch)
+        if kept is not None and self._told.get(playback) != told:
+            self._told[playback] = told
+            entries = [entry for stretch in kept.stretches for entry in stretch]
+            playback.happened.tell(entries)
+            playback.parameters.tell(entries, tape.first_ns, tape.last_ns)
 
     def _list_events(self, menu: QMenu) -> None:
         tape = self._playback.tape
