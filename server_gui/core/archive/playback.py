@@ -343,7 +343,7 @@ def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str
 
 
 def _description(
-    tape: Tape, jumps: int, words: Mapping[str, dict[str, str]], parameters: list[ParameterInfo]
+    tape: Tape, jumps: int, words: Mapping[str, dict[str, str]], parameters: Sequence[ParameterInfo] = ()
 ) -> Description:
     """Return the robot's description, as far as its channels show it."""
     channels = []
@@ -361,7 +361,7 @@ def _description(
         role="recording",
         components=[ComponentInfo(name, kind, "ok") for name, kind in components.items()],
         channels=channels,
-        parameters=parameters,
+        parameters=[*parameters],
         modules={},
         clock=Clock(0, 0, f"jump {jumps}"),
         stop=StopInfo(held=False, reason=None, since_ns=None, stopped_again={}, drives={}),

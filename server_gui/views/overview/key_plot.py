@@ -115,7 +115,7 @@ class KeyPlot(Card):
         whose = (AT_START, "start ") if _at_start(station) else ("limit ", "")
         wordings: Wordings = (whose[0], dict[str, str]()), (whose[1], {}), (whose[1], LETTERS)
         fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
-        self.legend.say(parts(told.values(), *next(fits, wordings[1])))
+        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if _at_start(station) else 1])))
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
         )

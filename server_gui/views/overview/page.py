@@ -119,7 +119,8 @@ class Overview(QWidget):
 
         As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
         """
-        room = self.window().size(), self._theme.scale, self._model.rowCount(), self._columns
+        size, rows = self.window().size(), self._model.rowCount()
+        room = size, self._theme.scale, rows, self._columns, self.is_numbers_first
         if room != self._ordered_for:
             self._ordered_for = room
             is_low = self._is_too_low()

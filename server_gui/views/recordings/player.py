@@ -77,7 +77,7 @@ class Player(QWidget):
         self._worded = 0, False  # the instant of which the words are, and whether it was being read
         self._told: dict[Playback, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
-        self.overview.is_numbers_first = False  # a walk is replayed for how it looked
+        self.overview.is_numbers_first = False  # a walk is replayed for how it looked, until a drive fails
         notes = RecordedNotes(self._playback, archive.labels)
         self.beside = SideBySide(self._playback, archive.settings, archive.reading.do, archive.deliver)
         self.signals = Signals(
@@ -158,7 +158,7 @@ class Player(QWidget):
             self.beside.close()
             self.beside_bar.refresh()
             self._end_comparing()
-            self._was_wrong = False
+            self._was_wrong = self.overview.is_numbers_first = False
             self._make_room()
             self.alarms.list.hide()
             self.alarms.hide()
@@ -337,7 +337,7 @@ class Player(QWidget):
         """Show what was wrong then; once something was, its line stays, so that nothing moves again."""
         self.alarms.refresh()
         if self.alarms.told and not self._was_wrong:
-            self._was_wrong = True
+            self._was_wrong = self.overview.is_numbers_first = True
             self._make_room()
         is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
         self.alarms.setVisible(self._was_wrong and not is_in_the_way)
@@ -381,7 +381,8 @@ class Player(QWidget):
         return sorted((*ours, *within), key=lambda one: one.at_ns)
 
     def _turn(self, way: int) -> None:
-        at_ns, found = self._playback.position_ns, self._in_order
+        at_ns = self._playback.position_ns
+        found = [flag for flag in self._in_order if self.timeline.is_within(flag)]
         later = (flag for flag in found if flag.at_ns > at_ns)
         earlier = (flag for flag in reversed(found) if flag.at_ns < at_ns)
         flag = next(later if way > 0 else earlier, None)

@@ -110,7 +110,12 @@ class Timeline(QWidget):
     def told(self, flag: Flag) -> str:
         """Return what happened, in words."""
         whose = "" if flag in self._flags else f"{self._other} "
-        return f"{whose}{flag.kind.value}: {flag.text}"
+        return f"{whose}{flag.kind.value}: {flag.text}{self._outside(flag)}"
+
+    def _outside(self, flag: Flag) -> str:
+        if self._tape is None or self.is_within(flag):
+            return ""
+        return ", before its beginning" if flag.at_ns < self._tape.first_ns else ", after its end"
 
     def choose(self, begin_ns: int, end_ns: int) -> None:
         """Choose a span."""
@@ -269,7 +274,7 @@ class Timeline(QWidget):
     def _draw_beside(self, painter: QPainter, bar: QRectF) -> None:
         """Through the bar, with a smaller mark: what happened in the second recording."""
         for flag in self._beside:
-            if not self._is_within(flag):
+            if not self.is_within(flag):
                 continue
             mark, x, side = FLAGS[flag.kind], self._x(flag.at_ns), float(self._theme.px(8))
             colour = self._theme.colour(mark.colour)
@@ -277,13 +282,16 @@ class Timeline(QWidget):
             painter.drawLine(QPointF(x, bar.top()), QPointF(x, bar.bottom()))
             draw(painter, mark, colour, QRectF(x - side / 2, bar.top() - side - 1, side, side))
 
-    def _is_within(self, flag: Flag) -> bool:
+    def is_within(self, flag: Flag) -> bool:
+        """Return whether it happened in the recording: before and after it, the bar has no place for it."""
         return self._tape is not None and self._tape.first_ns <= flag.at_ns <= self._tape.last_ns
 
     def _draw_flags(self, painter: QPainter, bar: QRectF) -> None:
         """As in the plots: where several have no room, the worst."""
         side = float(self._theme.px(11))
-        for x, kind in told([(self._x(flag.at_ns), flag.kind) for flag in self._flags], side):
+        for x, kind in told(
+            [(self._x(flag.at_ns), flag.kind) for flag in filter(self.is_within, self._flags)], side
+        ):
             mark, box = FLAGS[kind], QRectF(x - side / 2, bar.top() - side - 1, side, side)
             draw(painter, mark, self._theme.colour(mark.colour), box)
 
@@ -294,7 +302,7 @@ class Timeline(QWidget):
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)
-        flags = [*self._flags, *filter(self._is_within, self._beside)]
+        flags = [*filter(self.is_within, self._flags), *filter(self.is_within, self._beside)]
         pointed = [flag for flag in flags if abs(self._x(flag.at_ns) - place.x()) <= near]
         return min(pointed, key=lambda flag: FIRST.index(flag.kind), default=None)  # as it is drawn
 

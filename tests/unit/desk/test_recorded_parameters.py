@@ -14,7 +14,7 @@ KNEE, HIP = "left_knee.max_torque", "left_hip.max_torque"
 def opened(events: list[dict[str, str]] | None = None, **setup: str) -> RecordedParameters:
     session = SimpleNamespace(parameters={KNEE: 80, HIP: None}, setup=setup)
     made = RecordedParameters()
-    made.open(cast(Tape, SimpleNamespace(session=session, events=events or [])))
+    made.open(cast("Tape", SimpleNamespace(session=session, events=events or [])))
     return made
 
 
@@ -56,7 +56,9 @@ def test_a_write_counts_from_when_it_was_done_and_a_trial_until_it_was_taken_bac
 def test_what_a_failed_end_has_left_is_not_known(what: str) -> None:
     made = opened()
     asked = {"before": {KNEE: 80}, "after": {KNEE: 40}}
-    made.tell([entry("write", 10, **asked), entry("trial begun", 12, after={KNEE: 40}), entry(what, 20)], 0, 50)
+    made.tell(
+        [entry("write", 10, **asked), entry("trial begun", 12, after={KNEE: 40}), entry(what, 20)], 0, 50
+    )
     assert [knee(made, at_ns) for at_ns in (12, 20)] == [40, None]
 
 
