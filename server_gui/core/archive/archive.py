@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ml.store.sessions import Session
 from server_gui.core.archive.collected_journals import KeptJournals
+from server_gui.core.archive.label_hits import LabelHits
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.archive.library import Library
 from server_gui.core.archive.playback import Playback
@@ -43,6 +44,7 @@ class Archive:
         self.playback = Playback(self.reading.do, deliver, desk.shown)
         self._comparing = Background("comparing")  # reads long: nothing that is played waits for it
         self.compared = RecordingComparison(settings, self._comparing.do, deliver)
+        self.hits = LabelHits(settings, self._comparing.do, deliver)
         self.labels = SessionLabels(settings, self.reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.models = Models(

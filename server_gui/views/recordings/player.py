@@ -113,7 +113,7 @@ class Player(QWidget):
         self.timeline.toggled.connect(self._toggle)
         self.timeline.turned.connect(self._turn)
         self._flags: tuple[tuple[Flag, ...], tuple[Flag, ...]] = ((), ())  # of it, and of what is beside it
-        self.labels = LabelBar(archive.labels, self.timeline, theme)
+        self.labels = LabelBar(archive.labels, archive.hits, self.timeline, theme)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.setSpacing(6)

@@ -11,10 +11,10 @@ from server_gui.core.cloud.tape import Tape
 KNEE, HIP = "left_knee.max_torque", "left_hip.max_torque"
 
 
-def opened(events: list[dict[str, str]] | None = None, **setup: str) -> RecordedParameters:
-    session = SimpleNamespace(parameters={KNEE: 80, HIP: None}, setup=setup)
+def opened(*events: dict[str, str], setup: dict[str, str] | None = None) -> RecordedParameters:
+    session = SimpleNamespace(parameters={KNEE: 80, HIP: None}, setup=setup or {})
     made = RecordedParameters()
-    made.open(cast("Tape", SimpleNamespace(session=session, events=events or [])))
+    made.open(cast("Tape", SimpleNamespace(session=session, events=events)))
     return made
 
 
@@ -28,7 +28,7 @@ def knee(parameters: RecordedParameters, at_ns: int) -> float | None:
 
 
 def test_object_and_unit_are_those_of_the_recording_and_what_it_does_not_tell_is_not_there() -> None:
-    made = opened(**{f"object/{KNEE}": "0x6072:0 N·m"})
+    made = opened(setup={f"object/{KNEE}": "0x6072:0 N·m"})
     (info,) = made.described
     assert (info.name, info.component, info.object, info.unit) == (KNEE, "left_knee", "0x6072:0", "N·m")
     assert {name: (one.value, one.unit) for name, one in made.at(0).items()} == {KNEE: (80.0, "N·m")}
@@ -64,6 +64,6 @@ def test_what_a_failed_end_has_left_is_not_known(what: str) -> None:
 
 def test_without_a_whole_journal_only_the_start_is_known() -> None:
     assert not opened().told, "nobody has told its journal"
-    broken = opened([{"kind": "journal_gap"}])
+    broken = opened({"kind": "journal_gap"})
     broken.tell([], 0, 50)
     assert not broken.told
