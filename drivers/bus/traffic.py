@@ -3,7 +3,7 @@
 Only of frames that come to us: an interface that filters for us lets no others through.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -26,16 +26,21 @@ KINDS = {
 }
 OF_NO_NODE = {0x080: "SYNC", 0x7E4: "LSS", 0x7E5: "LSS"}
 OF_ALL = ("NMT", "time")  # one identifier each
+NAMED = 4  # identifiers of a talk that are told
 _id_of = itemgetter(1)
 
 
 @dataclass(frozen=True, slots=True)
 class Talk:
-    """Frames of one kind; `node_id` is None where they belong to no node."""
+    """Frames of one kind; `node_id` is None where they belong to no node.
+
+    `identifiers` are the `NAMED` with the most frames, with SocketCAN's flags (`drivers.bus.frames`).
+    """
 
     kind: str
     node_id: int | None
     frames_per_s: float
+    identifiers: tuple[int, ...] = ()
 
 
 class Traffic:
@@ -67,11 +72,15 @@ class Traffic:
 
 def talks(counts: Iterable[tuple[int, int]], seconds: float) -> list[Talk]:
     """Return the shares of frames with these ids, the largest first; without error frames."""
-    found: Counter[tuple[str, int | None]] = Counter()
+    found: defaultdict[tuple[str, int | None], Counter[int]] = defaultdict(Counter)
     for can_id, count in counts:
         if not can_id & ERROR:
-            found[kind_of(can_id)] += count
-    return [Talk(kind, node_id, count / seconds) for (kind, node_id), count in found.most_common()]
+            found[kind_of(can_id)][can_id] += count
+    made = (
+        Talk(*whose, ids.total() / seconds, tuple(one for one, _ in ids.most_common(NAMED)))
+        for whose, ids in found.items()
+    )
+    return sorted(made, key=lambda talk: -talk.frames_per_s)
 
 
 def kind_of(can_id: int) -> tuple[str, int | None]:

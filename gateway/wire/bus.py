@@ -7,6 +7,7 @@ from gateway.wire.method import Method, Params
 from gateway.wire.role import Role
 
 CLOSED = "closed"  # a bus's state that is not open
+EXTENDED, REMOTE = 1 << 31, 1 << 30  # of an identifier: it has 29 bits; it is a remote request
 
 
 class NodeInfo(Struct, frozen=True):
@@ -27,11 +28,16 @@ class NodeInfo(Struct, frozen=True):
 
 
 class TalkInfo(Struct, frozen=True):
-    """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set."""
+    """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set.
+
+    Of its identifiers those with the most frames are named; bit 31 is set in one of 29 bits, bit 30 in a
+    remote request, as in SocketCAN.
+    """
 
     kind: str
     node_id: int | None  # None: they belong to no node
     frames_per_s: float
+    identifiers: list[int] = []
 
 
 class BusInfo(Struct, frozen=True):

@@ -132,8 +132,8 @@ class Registry:
         return sorted(found, key=lambda each: each.path)
 
     def shipped(self) -> frozenset[str]:
-        """Return the models that come with GWRMS and that nobody has promoted."""
-        return frozenset(_ids(self._shipped)) - frozenset(_ids(self._objects))
+        """Return the models that come with GWRMS: they serve robots for which no other was promoted."""
+        return frozenset(_ids(self._shipped))
 
     # --- which one serves
 

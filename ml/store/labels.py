@@ -105,6 +105,16 @@ def wearer(label: str) -> str | None:
     return label.removeprefix(WEARER) if label.startswith(WEARER) else None
 
 
+def wearers(labels: Iterable[str], recorded: str = "") -> dict[str, list[str]]:
+    """Return who wore the robot, by labels and the recording: person → how that was spelled."""
+    spelled = {name for each in labels if (name := wearer(each))} | ({recorded} - {""})
+    found: dict[str, list[str]] = {}
+    for name in sorted(spelled):
+        if who := person(name):
+            found.setdefault(who, []).append(name)
+    return found
+
+
 def counts(label: str) -> bool:
     """Return whether a label is more than words: models learn from it, or it is of the whole session."""
     return label in (*ACTIVITIES, *INSTANTS, REGRESSION) or wearer(label) is not None

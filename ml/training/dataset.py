@@ -22,7 +22,7 @@ from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
-from ml.store.labels import REGRESSION, Label, LabelSource, holding, person, wearer
+from ml.store.labels import REGRESSION, Label, LabelSource, holding, wearers
 from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
@@ -217,9 +217,9 @@ def _recorded_wearer(store: Store, ask: Ask) -> str:
 
 def _wearer(labels: Sequence[Label], recorded: str) -> str:
     """Return the wearer, however spelled; "" without a name."""
-    names = sorted({name for each in labels if (name := wearer(each.label))} | ({recorded} - {""}))
-    people = {who for name in names if (who := person(name))}
+    people = wearers((each.label for each in labels), recorded)
     if len(people) > 1:
+        names = sorted(name for spelled in people.values() for name in spelled)
         raise UnusableData(f"it has labels of several wearers: {', '.join(names)}; take all but one back")
     return "".join(people)
 

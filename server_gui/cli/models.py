@@ -39,7 +39,8 @@ USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL]
 A model's name may be abbreviated as long as it is unique. gwrms models COMMAND --help says more.
 """
 PROMOTE_EPILOG: Final = """Running servers load it within seconds, without a restart. A model that cannot be
-verified is refused, and the present one continues to serve. `gwrms train --promote` does this if a model is
+verified is refused, and the present one continues to serve. Classes that the present one knows and
+this one does not are named in a warning. `gwrms train --promote` does this if a model is
 judged better. With --instead-of it is refused if another model than the named one serves by then.
 
 examples
@@ -49,7 +50,6 @@ ROLLBACK_EPILOG: Final = """Repeat it to go back further. Before the first model
 all robots serves; before the first of those, the one that comes with GWRMS."""
 KEY_EPILOG: Final = """Put that line into [promoters] of the server's file, on every computer that records
 these robots, to let a rule stop them by the models that this desk promotes."""
-SHIPPED: Final = f"by default ({UNSIGNED})"
 NOTHING: Final = "nothing"  # that serves
 
 
@@ -87,7 +87,7 @@ def _row(card: Card, serving: Serving) -> tuple[str, ...]:
         when(card.made),
         f"{age_days(card):.0f}",
         judged,
-        SHIPPED if shipped else serving.told(card.id) or NONE,
+        serving.told(card.id) or NONE,
     )
 
 
@@ -110,8 +110,7 @@ def show(argv: list[str]) -> int:
     if arguments.json:
         say_json(_fields(card, serving) | {"problem": problem})
     else:
-        whom = SHIPPED if card.id in serving.shipped else serving.told(card.id)
-        say("\n".join(told(card, whom, problem, shipped=card.id in serving.shipped)))
+        say("\n".join(told(card, serving.told(card.id), problem, shipped=card.id in serving.shipped)))
     return 1 if problem else 0
 
 
@@ -157,7 +156,11 @@ def _tell(arguments: argparse.Namespace, task: str, now: Pointer) -> int:
         say_json({"task": task, "robot": arguments.robot, "now": now})
     else:
         whom = arguments.robot or EVERY
-        gone = f"no {'own ' if arguments.robot else ''}model serves {whom} any more"
+        gone = (
+            f"no own model serves {whom} any more; what does is the one for {EVERY}, else by default"
+            if arguments.robot
+            else f"no promoted model serves {whom} any more; those that came with GWRMS do by default"
+        )
         say(f"{task}: {now.model} serves {whom}\n" if now.model else f"{task}: {gone}\n")
     if now.model and not now.signature:
         warn(

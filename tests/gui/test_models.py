@@ -163,6 +163,28 @@ def test_what_training_has_said_of_a_model_is_read_again_before_it_is_promoted(
     assert "lack 12 of its channels" in page.confirm.words.text()
 
 
+def test_classes_that_would_be_lost_stand_out_before_a_promotion_and_beside_the_other(
+    shown: Shown, both: tuple[Card, Card], theme: Theme, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for place in ("core.models.changes", "views.models.compare"):
+        monkeypatch.setattr(f"server_gui.{place}.unknown_to", lambda *_: "It does not know stairs.")
+    page, (_, other) = opened(shown), both
+    choose(shown, page, other)
+    click(page.promote)
+    shown.until(page.confirm.isVisible, "asked")
+    for said in (page.confirm.warning, page.compare.warning):
+        assert said.isVisible()
+        assert said.text() == "▲ It does not know stairs."
+        assert said.palette().windowText().color() == theme.colour("warn")
+
+
+def test_the_list_of_models_is_as_high_as_its_rows(shown: Shown, both: tuple[Card, Card]) -> None:
+    page, (one, _) = opened(shown), both
+    choose(shown, page, one)
+    last = page.table.visualRect(page.table.model().index(page.table.model().rowCount() - 1, 0))
+    assert 0 <= page.table.viewport().height() - last.bottom() < last.height()
+
+
 def test_a_model_serves_only_once_that_was_confirmed(
     shown: Shown, both: tuple[Card, Card], registry: Registry, archive: Archive
 ) -> None:
@@ -210,7 +232,10 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     whole.open("Models")
     page = whole.window.tabs.models
     click(page.new)
-    page.form.held_out.setText("s3")
+    whole.until(lambda: "Nobody is chosen" in page.form.said.text(), "said what is labelled")
+    (judge,) = page.form.judges.findItems("s3", Qt.MatchFlag.MatchExactly)
+    judge.setCheckState(0, Qt.CheckState.Checked)
+    whole.until(lambda: "Judged by s3" in page.form.said.text(), "said by whom it is judged")
     click(page.form.begin)
     (job,) = archive.models.jobs.jobs
     whole.draw()

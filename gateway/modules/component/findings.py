@@ -40,7 +40,10 @@ def _bus(bus: CanBus, now_ns: int) -> BusInfo:
         nodes=[_node(nodes[node_id], now_ns) for node_id in sorted(nodes)],
         problem=bus.trouble,
         findings=finding_infos(bus.findings),
-        talks=[TalkInfo(one.kind, one.node_id, round(one.frames_per_s, 1)) for one in bus.traffic.talks],
+        talks=[
+            TalkInfo(one.kind, one.node_id, round(one.frames_per_s, 1), list(one.identifiers))
+            for one in bus.traffic.talks
+        ],
         strangers=_strangers(bus),
     )
 

@@ -15,6 +15,7 @@ from server_gui.core.cloud import spool_reader, usage
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.losses import told_time
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
@@ -169,7 +170,11 @@ def _gone(settings: ServerSettings) -> str | None:
     newest, url = Receipts(settings.recorder.spool / RECEIPTS).newest(), settings.store.url
     if newest is None or newest.url != url:
         return None
-    return f"there is no store at {url} any more, and batch {newest.batch} of this computer was in it"
+    ends = [part.end_us for part in newest.parts if part.end_us is not None]
+    what = (
+        f"what was recorded until {told_time(max(ends) * 1_000, 'seconds')}" if ends else "what was recorded"
+    )
+    return f"there is no store at {url} any more; {what} was uploaded to it and is not kept here"
 
 
 def _waiting(settings: ServerSettings) -> list[Session]:

@@ -173,8 +173,10 @@ def _row(
     share = UNKNOWN if talk is None else f"{100 * talk.share:.0f} %"
     sends = "" if talk is None else ", ".join(f"{kind} {rate:.0f}/s" for kind, rate in talk.kinds)
     if node is None:
+        name = "not in the file" if node_id is not None else talk.who if talk else ""
+        ids = f" {talk.ids}" if talk is not None and talk.ids else ""
         return _nameless(
-            "not in the file" if node_id is not None else (talk.who if talk else ""),
+            f"{name}{ids}",
             share,
             frames,
             "" if node_id is None else str(node_id),

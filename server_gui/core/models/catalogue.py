@@ -22,6 +22,7 @@ from server_gui.core.prediction.track_record import TrackRecord
 from server_gui.core.settings.promoters import UNSIGNED, desk_signature, signer
 
 KEY: Final = re.compile(r"\b[0-9a-f]{64}\b")  # a fingerprint
+BY_DEFAULT: Final = "by default"  # where no other was promoted
 SHORT: Final = 16  # of its signs, as people compare it
 
 
@@ -44,8 +45,11 @@ class Serving:
 
     def told(self, model: str) -> str:
         """Return the robots that a model serves, each with the signer of its promotion."""
-        pairs = zip(self.whom.get(model, ()), self.signed.get(model, ()), strict=True)
-        return ", ".join(f"{whom} ({signed})" for whom, signed in pairs)
+        whom, signed = self.whom.get(model, []), self.signed.get(model, [])
+        pairs = [*zip(whom, signed, strict=True)]
+        if model in self.shipped and EVERY not in whom:
+            pairs.append((BY_DEFAULT, UNSIGNED))
+        return ", ".join(f"{served} ({by})" for served, by in pairs)
 
 
 def _signer(registry: Registry, task: str, robot: str, now: Pointer, promoters: Mapping[str, str]) -> str:
@@ -71,7 +75,8 @@ class Entry:
     @property
     def whom(self) -> str:
         """Return the robots that it serves, in words."""
-        return "by default" if self.shipped else ", ".join(self.serves) or "nobody"
+        default = (BY_DEFAULT,) if self.shipped and EVERY not in self.serves else ()
+        return ", ".join((*self.serves, *default)) or "nobody"
 
     @property
     def signature(self) -> str:

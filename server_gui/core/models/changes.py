@@ -68,8 +68,6 @@ class ModelChange:
             return
         yield f"Serves now: {self._told(self.now)}."
         yield f"Will serve: {self._told(self.then)}."
-        if self.lost:
-            yield f"▲ {self.lost}"
         if self.judged:
             yield f"Training has judged it: {self.judged}"
         if self.then is None:

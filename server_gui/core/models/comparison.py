@@ -84,8 +84,6 @@ def rows(one: Card, other: Card | None) -> list[Row]:
 
 def notes(one: Entry, other: Entry | None) -> Iterator[str]:
     """Yield notes on such a comparison."""
-    if other is not None and (lost := unknown_to(one.card, [other.card], "the other")):
-        yield f"▲ {lost}"
     if other is not None and set(one.card.held_out) != set(other.card.held_out):
         yield "Each was judged on sessions of its own, so no verdict; training judges both on the same."
     if other is not None and (known := set(other.card.learned) & set(one.card.held_out)):

@@ -12,6 +12,7 @@ from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import ModelChange, carry_out, promotion, way_back
+from server_gui.core.models.lessons import Lessons, lessons
 from server_gui.core.models.training import BETTER, Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -61,6 +62,9 @@ class Models:
         self._deliver = deliver
         self._thread = Background("list of models")
         self._looking = Looking(url, promoters)
+        self.lessons: Lessons | None = None  # of what was asked last; None while that is not known
+        self._lessons_of: tuple[str, str] | None = None
+        self._lessons_s: float | None = None  # when they were asked for, on our monotonic clock
         self._looks = False
         self._results: list[tuple[str, Tone]] = []  # of trainings, said once their models are listed
         self._lists = 0  # of them, those whose models the look under way must find
@@ -89,6 +93,24 @@ class Models:
     def is_training(self) -> bool:
         """Whether a training waits or is under way."""
         return any(not job.is_over for job in self.jobs.jobs)
+
+    def look_for_lessons(self, task: str, robot: str) -> None:
+        """Look what is labelled for a training, where it is time: for a form that is open."""
+        of, now_s = (task, robot), time.monotonic()
+        if of == self._lessons_of and self._lessons_s is not None and now_s - self._lessons_s < LOOK_S:
+            return
+        if of != self._lessons_of:
+            self.lessons = None
+        self._lessons_of, self._lessons_s = of, now_s
+
+        def found(answer: Lessons) -> None:
+            if of == self._lessons_of:  # else something else was asked meanwhile
+                self.lessons = answer
+
+        def failed(error: Exception) -> None:
+            found(Lessons(problem=f"internal error, {type(error).__name__}"))
+
+        when_done(self._thread.do(lambda: lessons(self.url, task, robot)), self._deliver, found, failed)
 
     def train(self, wish: TrainingWish, teach: Teach) -> Job:
         """Train in the background; it publishes a model, and promotes none."""

@@ -16,7 +16,7 @@ ACTIVE: Final = "error active"
 OFF: Final = "bus off"
 FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
 TAKEN: Final = "of its time is taken"
-BUSY_PERCENT: Final = 80.0  # as the gateway finds it
+BUSY_PERCENT, NO_MORE_PERCENT = 80.0, 70.0  # as the gateway finds it: from, until
 OLD_S: Final = 5.0  # what was seen before is not known now
 UNKNOWN: Final = "bus not known"
 FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
@@ -126,6 +126,7 @@ def rated(bus: BusInfo) -> list[Rated]:
     own = [one for one in bus.findings if not (is_known and one.words.endswith(TAKEN))]
     if len(own) < len(bus.findings) or load >= BUSY_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
+        said += f", until below {NO_MORE_PERCENT:.0f} %" if is_known and load < BUSY_PERCENT else ""
         full = [(f"{said}: {load_text(bus)} {TAKEN}", fewer(bus))]
     warning, alarm = BusHealthLevel.WARNING, BusHealthLevel.ALARM
     of_state, of_load = (
@@ -153,7 +154,7 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
         "findings": bool(bus.findings),
         "not read in time": any("stood still" in one.words for one in bus.findings),
         "errors": any("error" in one.words for one in bus.findings),
-        "busy": load >= BUSY_PERCENT,
+        "busy": any(map(of_load, rated(bus))),
         "full": load >= FULL_PERCENT,
         bus.state: bus.state != ACTIVE,
         "it fails": bus.problem is not None,

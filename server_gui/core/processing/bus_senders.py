@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.wire.bus import BusInfo
+from gateway.wire.bus import EXTENDED, REMOTE, BusInfo
 
 OWN_KINDS: Final = frozenset({"EMCY", "TPDO", "SDO answer", "heartbeat"})  # that a node sends itself
 OTHER: Final = "other"  # of no kind that CiA 301 names
 NOBODY: Final = "no known node"
 REST: Final = "gateway or filtered"  # names the frames that did not come to the gateway
+MOST_IDS: Final = 4  # of a sender that are named
 NOISE: Final = 1.0  # frames/s: so much the rounding of each kind may add up to
 FEWER: Final = "send fewer PDOs or SYNC less often"
 
@@ -31,6 +32,12 @@ class Talking:
     share: float  # 0–1
     kinds: tuple[tuple[str, float], ...]
     name: str = ""
+    identifiers: tuple[int, ...] = ()  # with the most frames, with SocketCAN's flags; only the first are told
+
+    @property
+    def ids(self) -> str:
+        """Name the identifiers for people, of 29 bits with eight digits."""
+        return ", ".join(map(_hex, self.identifiers))
 
     @property
     def who(self) -> str:
@@ -74,9 +81,11 @@ def talking(bus: BusInfo) -> list[Talking]:
     names = {node.node_id: tuple(node.components) for node in bus.nodes}
     whole = total(bus) or 0.0
     found: dict[tuple[int | None, str], dict[str, float]] = {}
+    identifiers: dict[tuple[int | None, str], list[int]] = {}
     for one in bus.talks:
         node_id = one.node_id if one.kind in OWN_KINDS or one.kind == OTHER else None
         name = "" if node_id is not None else NOBODY if one.kind == OTHER else one.kind
+        identifiers.setdefault((node_id, name), []).extend(one.identifiers)
         sends = found.setdefault((node_id, name), {})
         sends[one.kind] = sends.get(one.kind, 0.0) + one.frames_per_s
     if rest := _rest(bus):
@@ -89,6 +98,7 @@ def talking(bus: BusInfo) -> list[Talking]:
             rate / whole if whole else 0.0,
             tuple(sorted(sends.items(), key=lambda item: -item[1])),
             name,
+            tuple(identifiers.get((node_id, name), ())[:MOST_IDS]),
         )
         for (node_id, name), sends in found.items()
     ]
@@ -101,9 +111,8 @@ def fewer(bus: BusInfo) -> str:
     if most is None:
         return f"find what sends so much, and {FEWER}"
     if most.name == NOBODY:
-        return (
-            f"{most.said}: find their identifiers (gwrms trace) and switch off what sends them; else {FEWER}"
-        )
+        known = f" ({most.ids})" if most.ids else ""
+        return f"{most.said}{known}: find what sends them (gwrms trace) and switch it off; else {FEWER}"
     return f"{most.said}, the most: {FEWER}"
 
 
@@ -120,6 +129,11 @@ def whole_numbers(rates: Sequence[float], of: float) -> list[int]:
 def _rest(bus: BusInfo) -> float:
     """Return the frames a second that did not come to the gateway; 0 where nothing is known of the others."""
     return max((total(bus) or 0.0) - sum(one.frames_per_s for one in bus.talks), 0.0) if bus.talks else 0.0
+
+
+def _hex(identifier: int) -> str:
+    plain = f"0x{identifier & ~(EXTENDED | REMOTE):0{8 if identifier & EXTENDED else 3}X}"
+    return f"{plain} (remote request)" if identifier & REMOTE else plain
 
 
 def _order(one: Talking) -> tuple[int, bool, int, str]:

@@ -25,12 +25,13 @@ from server_gui.core.models.comparison import (
     percent,
     rows,
     signed,
+    unknown_to,
     usual_other,
 )
 from server_gui.views.models.calibration import CalibrationPlot, Curve
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
-from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 
 TITLES: Final = ("", "This model", "Other", "Points", "", "Decisions")
@@ -59,8 +60,10 @@ class Compare(Card):
         self._entry: Entry | None = None
         self._found = Catalogue()
         self.said = _words()
-        self.week, self.notes = _words(), _words()
-        self.notes.setObjectName("dim")
+        self.week, self.notes, self.warning = _words(), _words(), _words()
+        for part in (self.notes, self.warning):
+            part.setObjectName("dim")
+        set_tone(self.warning, "warn")
         self.other = QComboBox()
         self.other.setAccessibleName("Compare with")
         self.other.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
@@ -133,6 +136,7 @@ class Compare(Card):
         self._both.addWidget(self._right, 2)
         self.body.addLayout(self._row)
         self.body.addWidget(self.week)
+        self.body.addWidget(self.warning)
         self.body.addWidget(self.notes)
         self.body.addLayout(self._both, 1)
 
@@ -153,12 +157,16 @@ class Compare(Card):
         if entry is None:
             set_text(self.said, CHOOSE)
             self.notes.hide()
+            self.warning.hide()
             return
         other = self._found.find(str(self.other.currentData() or ""))
         for part in (self._with, self.other):
             part.setVisible(other is not None)
         set_text(self.said, f"{entry.name}; serves {entry.whom}{_signed(entry)}")
         set_text(self.week, f"Last week: {last_week(entry)}{self._its_week(other)}")
+        lost = "" if other is None else unknown_to(entry.card, [other.card], "the other")
+        set_text(self.warning, f"▲ {lost}")
+        self.warning.setVisible(bool(lost))
         told = "\n".join(filter(None, (self._judged, " ".join(notes(entry, other)))))
         set_text(self.notes, told)
         self.notes.setVisible(bool(told))

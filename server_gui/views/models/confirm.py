@@ -4,7 +4,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton
 
 from server_gui.core.models.changes import ModelChange
 from server_gui.core.models.models import Models
-from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 
 
@@ -17,6 +17,10 @@ class Confirm(Card):
         self._shown: ModelChange | None = None
         self.words = PlainLabel()
         self.words.setWordWrap(True)
+        self.warning = PlainLabel()
+        self.warning.setWordWrap(True)
+        self.warning.setObjectName("dim")
+        set_tone(self.warning, "warn")
         self.why = QLineEdit()
         self.why.setPlaceholderText("Why: kept in the history")
         self.why.setAccessibleName("Why this is changed")
@@ -28,6 +32,7 @@ class Confirm(Card):
         row.addWidget(self.why, 1)
         row.addWidget(self.no)
         row.addWidget(self.yes)
+        self.body.addWidget(self.warning)
         self.body.addWidget(self.words)
         self.body.addLayout(row)
         self.hide()
@@ -43,6 +48,8 @@ class Confirm(Card):
             self.set_title(f"{change.title}?")
             self.setAccessibleName(change.title)
             set_text(self.words, "\n".join(change.sentences))
+            set_text(self.warning, f"▲ {change.lost}")
+            self.warning.setVisible(bool(change.lost))
             self.yes.setText("Roll back" if change.is_rollback else "Promote")
             self.why.clear()
             self.no.setFocus()

@@ -21,6 +21,7 @@ TITLES: Final = ("Model", "Serves", "Signed", "Judged", "Age, days", "Right last
 NAME, SERVES, SIGNED, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
 NUMBERS: Final = frozenset({JUDGED, AGE})
 NAMES: Final = {NAME: 190, SERVES: 84, SIGNED: 70, WEEK: 90, FROM: 90}  # wide at least, at text of 100 %
+FEWEST, MOST = 2, 8  # rows that it has room for; more are scrolled
 SPARE: Final = (FROM, AGE, SIGNED)  # left out in this order where there is less room; tips have all
 
 
@@ -79,11 +80,13 @@ class ModelsTable(RowsTable):
         self._fit()
 
     def _fit(self) -> None:
+        rows = min(max(self._rows.rowCount(), FEWEST), MOST)
+        height = rows * self.verticalHeader().defaultSectionSize() + 2 * self.frameWidth()
+        self.setFixedHeight(height + self.horizontalHeader().sizeHint().height())
         columns.fit(self, {column: self._theme.px(least) for column, least in NAMES.items()}, SPARE)
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(24))
-        self.setMinimumHeight(self._theme.px(120))
         self._fit()
 
 

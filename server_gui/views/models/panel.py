@@ -130,15 +130,15 @@ class ModelsPage(QWidget):
         self._list = Card("Models")
         self._list.body.addWidget(self.state)
         self._list.body.addWidget(self.learned)
-        self._list.body.addWidget(self.table, 1)
+        self._list.body.addWidget(self.table)
         self._list.body.addLayout(self._actions)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
-        everything.addWidget(self._list, 2)
+        everything.addWidget(self._list)
         everything.addWidget(self.confirm)
         everything.addWidget(self.said)
         everything.addWidget(self.form)
-        everything.addWidget(self.compare, 3)
+        everything.addWidget(self.compare, 1)
 
     def _connect(self) -> None:
         self.new.toggled.connect(self._show_form)

@@ -1,17 +1,19 @@
 """Form for a training, and the running trainings with their progress."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QAbstractItemView, QComboBox, QGridLayout, QLineEdit, QPushButton, QSizePolicy
+from PySide6.QtWidgets import QAbstractItemView, QComboBox, QGridLayout, QPushButton, QSizePolicy
 
+from server_gui.core.models.lessons import Lessons
 from server_gui.core.models.models import Models
 from server_gui.core.models.names import EVERY, TASKS
 from server_gui.core.models.training import TrainingWish
 from server_gui.views.cloud.jobs_table import JobsTable
+from server_gui.views.models.judges import Judges
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 
 ABOUT: Final = (
@@ -19,6 +21,8 @@ ABOUT: Final = (
     "not seen: that takes labels of three wearers, or sessions, at least. It is listed afterwards; nothing "
     "serves another model before you promote it."
 )
+LOOKING: Final = "Looking what is labelled …"
+QUARTER: Final = "a quarter of them, always the same"
 
 
 class TrainForm(Card):
@@ -31,13 +35,12 @@ class TrainForm(Card):
         about = PlainLabel(ABOUT)
         about.setObjectName("dim")
         about.setWordWrap(True)
-        self.task, self.robot, self.held_out = QComboBox(), QComboBox(), QLineEdit()
+        self.task, self.robot, self.judges = QComboBox(), QComboBox(), Judges(theme)
+        self.said = PlainLabel()
+        self.said.setObjectName("dim")
+        self.said.setWordWrap(True)
         for task, name in TASKS.items():
             self.task.addItem(name, task)
-        self.held_out.setPlaceholderText("a quarter of them, by their names")
-        self.held_out.setToolTip(
-            "Wearers, or sessions, with commas between them; the same ones stay held out"
-        )
         self.begin = QPushButton("Start training")
         self.begin.setObjectName("primary")
         self.begin.clicked.connect(self._begin)
@@ -47,14 +50,15 @@ class TrainForm(Card):
         self.jobs.setSizeAdjustPolicy(QAbstractItemView.SizeAdjustPolicy.AdjustToContents)
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
-        names = {"What it predicts": self.task, "For": self.robot, "Judged by": self.held_out}
+        names = {"What it predicts": self.task, "For": self.robot, "Wearers": self.judges}
         for row, (name, field) in enumerate(names.items()):
             title = PlainLabel(name)
             title.setObjectName("dim")
             field.setAccessibleName(f"Training: {name}")
             grid.addWidget(title, row, 0)
             grid.addWidget(field, row, 1)
-        grid.addWidget(self.begin, len(names), 1)
+        grid.addWidget(self.said, len(names), 1)
+        grid.addWidget(self.begin, len(names) + 1, 1)
         self.body.addWidget(about)
         self.body.addLayout(grid)
         self.body.addWidget(self.jobs)
@@ -69,11 +73,30 @@ class TrainForm(Card):
         """Show how far trainings are."""
         self.jobs.refresh()
         self.jobs.setVisible(self._models.is_training)  # what came of one, the page says
+        if not self.isVisible():
+            return
+        self._models.look_for_lessons(str(self.task.currentData()), str(self.robot.currentData()))
+        lessons = self._models.lessons
+        self.judges.show_lessons(lessons or Lessons())
+        problem = "" if lessons is None else lessons.problem
+        set_text(self.said, _said(lessons, self.judges.chosen))
+        set_tone(self.said, "warn" if problem else "")
         self.begin.setEnabled(not self._models.is_training)
 
     def _begin(self) -> None:
-        names = tuple(name.strip() for name in self.held_out.text().split(",") if name.strip())
-        self.wished.emit(TrainingWish(str(self.task.currentData()), str(self.robot.currentData()), names))
+        task, robot = str(self.task.currentData()), str(self.robot.currentData())
+        self.wished.emit(TrainingWish(task, robot, self.judges.chosen))
+
+
+def _said(lessons: Lessons | None, chosen: Sequence[str]) -> str:
+    """Return who will judge, or why nobody can."""
+    if lessons is None:
+        return LOOKING
+    if lessons.problem:
+        return f"▲ {lessons.problem}"
+    if chosen:
+        return f"Judged by {', '.join(chosen)}; it learns from the others."
+    return f"Nobody is chosen: judged by {', '.join(sorted(lessons.usual))}, {QUARTER}."
 
 
 def offer_robots(choice: QComboBox, robots: Iterable[str]) -> None:

@@ -181,9 +181,10 @@ def learning(bench: Bench) -> None:
     hand.key("alt+m")
     hand.insist("Train a model", lambda: hand.reads("What it predicts"))
     hand.reach("Start training")
-    hand.click("Training: Judged by")
-    hand.type(JUDGE)  # by name: else the recording of this bench may be among the judges
-    hand.sees(JUDGE)
+    hand.reach(JUDGE)
+    hand.insist(JUDGE, lambda: hand.reads("Nobody is chosen"), exactly=True)
+    hand.key("space")  # by name: else the recording of this bench may be among the judges
+    hand.sees(f"Judged by {JUDGE};")
     hand.keep("train")
     hand.click("Start training")
     hand.sees("Not compared with", within_s=AGAIN_S)

@@ -2,8 +2,9 @@
 
 import pytest
 
-from drivers.bus.frames import ERROR
-from drivers.bus.traffic import Talk, Traffic, kind_of
+from drivers.bus.frames import ERROR, EXTENDED, REMOTE
+from drivers.bus.traffic import NAMED, Talk, Traffic, kind_of, talks
+from gateway.wire import bus as wire
 
 SECOND_NS = 1_000_000_000
 
@@ -42,6 +43,17 @@ def test_frames_are_told_by_the_second_and_errors_are_none() -> None:
     traffic.look(SECOND_NS // 2)
     assert not traffic.talks, "its second is not over"
     traffic.look(2 * SECOND_NS)
-    assert list(traffic.talks) == [Talk("TPDO", 2, 50.0), Talk("SYNC", None, 25.0)]
+    assert list(traffic.talks) == [
+        Talk("TPDO", 2, 50.0, (0x182, 0x282)),
+        Talk("SYNC", None, 25.0, (0x080,)),
+    ]
     traffic.look(3 * SECOND_NS)
     assert not traffic.talks, "nothing came"
+
+
+def test_what_fills_a_bus_is_told_by_its_identifiers_the_most_frequent_first() -> None:
+    counts = [(0x001, 10), (0x7F0, 900), (EXTENDED | 0x123, 40), *((0x7F0 + n, 2) for n in range(1, 9))]
+    (talk,) = talks(counts, 1.0)
+    assert (EXTENDED, REMOTE) == (wire.EXTENDED, wire.REMOTE), "drivers and wire mean the same"
+    assert talk.identifiers[:3] == (0x7F0, EXTENDED | 0x123, 0x001)
+    assert len(talk.identifiers) == NAMED

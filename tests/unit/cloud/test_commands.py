@@ -314,7 +314,7 @@ def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(
         with pytest.raises(SystemExit):
             desk.run("cloud", "retain", "--days", days)
         assert f"{days!r} is no number of days: write a number from 0 to" in capsys.readouterr().err
-    assert "there is no terminal to ask on" in desk.run("cloud", "retain", "--days", "0", status=1)
+    assert "There is no terminal to ask on" in desk.run("cloud", "retain", "--days", "0", status=1)
     assert desk.ask("cloud", "retain", "--days", "0", "--dry-run") == {"telemetry/000": 2 * ROWS}
     assert desk.ask("cloud", "retain", "--days", "0", "--yes") == {"telemetry/000": 2 * ROWS}
     assert Store(desk.url).dataset("telemetry/000").count_rows() == 0

@@ -67,7 +67,7 @@ def test_a_store_that_has_gone_is_not_one_that_was_never_there(
     (tmp_path / "store").rename(tmp_path / "away")
     found = look(settings)
     assert not found.is_empty
-    assert "any more, and batch" in (found.problem or "")
+    assert "any more; what was recorded until " in (found.problem or "")
     another = ServerSettings({}, StoreSettings(f"{settings.store.url}-2"), settings.recorder)
     assert look(another).is_empty
 

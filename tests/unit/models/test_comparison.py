@@ -15,6 +15,7 @@ from server_gui.core.models.comparison import (
     percent,
     rows,
     signed,
+    unknown_to,
     usual_other,
     week_short,
 )
@@ -119,9 +120,9 @@ def test_figures_that_were_judged_by_other_sessions_have_no_difference_and_no_ve
 
 def test_classes_that_only_the_other_knows_are_named() -> None:
     one, other = entry(), entry("activity-1", classes=("stand", "walk", "sit_to_stand", "turn"))
-    said = "▲ It does not know sit to stand, turn; the other does."
-    assert [note[: len(said)] for note in notes(one, other)] == [said]
-    assert list(notes(other, one)) == [], "it knows all that the other knows"
+    said = unknown_to(one.card, [other.card], "the other")
+    assert said.startswith("It does not know sit to stand, turn; the other does.")
+    assert not unknown_to(other.card, [one.card], "the other"), "it knows all that the other knows"
 
 
 @pytest.mark.parametrize(

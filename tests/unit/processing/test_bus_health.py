@@ -5,12 +5,15 @@ import time
 import pytest
 from msgspec.structs import replace
 
+from drivers.bus.health import BUSY_NO_MORE
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
 from server_gui.core.follow.events import BusesSeen, LinkChanged
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.bus_health import (
+    NO_MORE_PERCENT,
+    TAKEN,
     BusHealthLevel,
     findings,
     level,
@@ -19,6 +22,7 @@ from server_gui.core.processing.bus_health import (
     trouble,
     worst,
 )
+from server_gui.core.processing.bus_senders import fewer
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
@@ -105,6 +109,22 @@ def test_frames_of_no_node_are_said_to_take_most_of_a_bus() -> None:
     unlisted = TalkInfo("other", 12, 9000.0)
     _, wordings = worst(robot(replace(BUS, load_percent=24.0, talks=[*BUS.talks, unlisted])))
     assert wordings[0].endswith(" · 90 % of its frames are from node 12")
+
+
+def test_a_bus_that_is_a_little_less_full_than_busy_says_until_when_it_is_called_so() -> None:
+    """77 % was called busy beside a mark at 80 %."""
+    was = FindingInfo(1, f"84 % {TAKEN}", "send fewer PDOs")
+    found = findings(replace(BUS, load_percent=77.0, findings=[was]))
+    assert [words for words, _ in found] == [f"it is busy, until below 70 %: 77 % {TAKEN}"]
+    _, wordings = worst(robot(replace(BUS, load_percent=77.0, findings=[was])))
+    assert wordings[-1] == "CAN 77 %: busy"
+    assert NO_MORE_PERCENT == BUSY_NO_MORE, "as the gateway does it"
+
+
+def test_what_fills_a_bus_is_named_by_its_identifiers() -> None:
+    injected = TalkInfo("other", None, 9000.0, [0x7F0, 1 << 31 | 0x123, 1 << 30 | 0x182])
+    found = fewer(replace(BUS, load_percent=97.0, talks=[*BUS.talks, injected]))
+    assert "no known node (0x7F0, 0x00000123, 0x182 (remote request)): find what sends them" in found
 
 
 @pytest.mark.parametrize(

@@ -92,13 +92,23 @@ def test_a_rollback_brings_back_what_served_before(desk: Desk) -> None:
     desk.run("promote", one.id)
     desk.run("promote", other.id, "--who", "Ada", "--why", "stairs too")
     assert desk.run("rollback", "falling") == f"falling: {one.id} serves every robot\n"
-    assert desk.run("rollback", "falling") == "falling: no model serves every robot any more\n"
+    assert "no promoted model serves every robot any more; those that came" in desk.run("rollback", "falling")
     assert "nothing to roll back" in desk.run("rollback", "falling", status=1)
     assert "nothing to roll back" in desk.run("rollback", "falling", "--robot", "exo-01", status=1)
     lines = desk.run("history", "falling").splitlines()
     assert other.id in lines[2]
     assert lines[2].endswith("Ada (unsigned)   stairs too")
     assert [each["model"] for each in desk.ask("history", "falling")] == [one.id, other.id, one.id, ""]
+
+
+def test_a_shipped_model_that_was_promoted_and_rolled_back_serves_by_default(desk: Desk) -> None:
+    """It was said to serve nobody."""
+    shipped = desk.ask("ls")["models"][0]["id"]
+    desk.run("promote", shipped)
+    assert desk.run("ls").splitlines()[1].endswith("every robot (unsigned)")
+    desk.run("rollback", "falling")
+    assert desk.run("ls").splitlines()[1].endswith("by default (unsigned)")
+    assert "serves         by default (unsigned)" in desk.run("show", shipped)
 
 
 def test_a_model_takes_the_place_of_the_one_that_is_named_or_of_none(desk: Desk) -> None:

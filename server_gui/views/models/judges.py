@@ -1,0 +1,80 @@
+"""Wearers with labels, and which of them a training is judged by: a row each, with a box to check."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QTreeWidget, QTreeWidgetItem
+
+from gateway.plain_text import plain
+from server_gui.core.models.lessons import Lesson, Lessons
+from server_gui.views.theme import Theme
+from server_gui.views.widgets import columns
+from server_gui.views.widgets.plain import tip
+
+TITLES: Final = ("Judged by", "Sessions", "Labelled")
+NAME, SESSIONS, LABELLED = range(len(TITLES))
+MOST: Final = 6  # rows that it has room for; more are scrolled
+NAMELESS: Final = "A session that does not say whose it is; gwrms label SESSION --wearer NAME does"
+
+
+class Judges(QTreeWidget):
+    """What is checked stays so while the wearer is listed."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._shown: tuple[Lesson, ...] | None = None
+        self.setHeaderLabels(TITLES)
+        self.setRootIsDecorated(False)
+        self.setUniformRowHeights(True)
+        columns.prepare(self)
+        self.show_lessons(Lessons())
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """The wearers that are checked, or sessions without one's name."""
+        return tuple(item.text(NAME) for item in self._items() if _is_checked(item))
+
+    def show_lessons(self, lessons: Lessons) -> None:
+        """Show a row for each wearer."""
+        if lessons.each == self._shown:
+            return
+        checked = set(self.chosen)
+        self._shown = lessons.each
+        self.clear()
+        for lesson in lessons.each:
+            self._add(lesson, checked=lesson.name in checked)
+        rows = min(max(len(lessons.each), 1), MOST)
+        height = rows * max(self.sizeHintForRow(0), self._theme.px(20)) + 2 * self.frameWidth()
+        self.setFixedHeight(height + self.header().sizeHint().height())
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _add(self, lesson: Lesson, *, checked: bool) -> None:
+        item = QTreeWidgetItem(self, [plain(lesson.name), str(lesson.sessions), plain(lesson.said)])
+        item.setTextAlignment(SESSIONS, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        item.setFont(SESSIONS, self._theme.number_font())
+        item.setToolTip(LABELLED, tip(lesson.said))
+        if not lesson.is_named:
+            item.setToolTip(NAME, tip(NAMELESS))
+        if lesson.why_not:
+            item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsUserCheckable & ~Qt.ItemFlag.ItemIsEnabled)
+        else:
+            item.setCheckState(NAME, Qt.CheckState.Checked if checked else Qt.CheckState.Unchecked)
+
+    def _items(self) -> list[QTreeWidgetItem]:
+        found = (self.topLevelItem(place) for place in range(self.topLevelItemCount()))
+        return [item for item in found if item is not None]
+
+    def _fit(self) -> None:
+        px = self._theme.px
+        columns.fit(self, {LABELLED: px(120), NAME: px(110)})
+
+
+def _is_checked(item: QTreeWidgetItem) -> bool:
+    state = item.data(NAME, Qt.ItemDataRole.CheckStateRole)
+    return state is not None and Qt.CheckState(state) is Qt.CheckState.Checked
