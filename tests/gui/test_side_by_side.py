@@ -126,8 +126,13 @@ def test_while_two_are_compared_plots_have_the_room_of_the_tools_until_these_are
     player.beside_bar.tools.click()
     assert tools.isVisible()
     assert channels.isVisible()
-    player.beside_bar.close_button.click()
+    player.signals.cursors.click()
+    assert player.beside_bar.cursors.isChecked(), "one switch in two places"
+    menu = QMenu()
+    player.signals.beside.fill(menu)
+    menu.actions()[0].trigger()
     shown.draw()
+    assert player.beside.session is None, "nothing is beside"
     assert tools.isVisible()
     assert {len(plot.drawn) for plot in player.signals.plots} == {2}, "arranged as before"
 
@@ -140,7 +145,9 @@ def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
     session, moved = player.beside.session, archive.compared.moved
     assert session is not None
     assert moved is not None
+    shown.draw()
     assert player.beside_bar.cadence.text().startswith("gait cycles: ")
+    assert player.beside_bar.cadence.text().endswith(f": {moved.word}"), "and nothing is said of too few"
     first = next(one for one in archive.compared.pair or () if one.session != session.session)
     torque = Measured("left_knee.torque_rms", "torque RMS", "N·m", Word.CHANGED, 10, 12, 20.0, 30.0, 10.0)
     archive.compared.moved = replace(moved, metrics=(torque,))

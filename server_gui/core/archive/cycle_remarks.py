@@ -50,7 +50,7 @@ class CycleRemarks:
         said = (
             () if one is None else (f"{cycles}, {text.removeprefix(BEGIN)}" for text in self._said(one)[:2])
         )
-        return (*said, cycles, "")
+        return (*said, f"{cycles}: {self._found.word}", cycles, "")
 
     def _metrics(self) -> Iterator[Measured]:
         found = () if self._found is None else self._found.metrics

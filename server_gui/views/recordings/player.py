@@ -91,6 +91,7 @@ class Player(QWidget):
         self.beside_bar.closed.connect(self._end_comparing)
         self.beside_bar.arranged.connect(self.signals.show_tools)
         self.beside_bar.measured.connect(self.signals.cursors.setChecked)
+        self.signals.cursors.toggled.connect(self.beside_bar.cursors.setChecked)
         self._before: list[PlotSpec] | None = None  # the plots, before two recordings were compared
         self._remarked: object = None  # the comparison that the remarks are of
         self._views = (self.overview, self.signals)
@@ -165,6 +166,7 @@ class Player(QWidget):
 
     def show_beside(self, session: Session) -> None:
         """Show another recording in the same plots: what is played goes on with it from its beginning."""
+        self._end_comparing()
         self.beside.open(session)
         self.beside_bar.refresh()
         self.labelling.setChecked(self._has_room_for_all)
@@ -202,7 +204,9 @@ class Player(QWidget):
     def _refresh_beside(self) -> None:
         """Bring the second recording into the plots once it is there."""
         station, scene = self.beside.station, self.signals.scene
-        if station is not None and (scene.beside is None or scene.beside.station is not station):
+        if station is not None and scene.beside is None and self._before is not None:
+            self.beside_bar.close_button.click()  # it was put away in the menu of the signals
+        elif station is not None and (scene.beside is None or scene.beside.station is not station):
             self._put_beside(station)
         elif self._settling and self.signals.cards:
             if self._before is None:
