@@ -41,7 +41,6 @@ from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.frame.application import application, kept_settings, kept_theme
 from server_gui.views.frame.closing import wait_closed
-from server_gui.views.frame.empty import STARTS
 from server_gui.views.frame.garbage import Garbage
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.saved_state import kept_units
@@ -296,7 +295,7 @@ class App:
         elif own.problem:
             self.window.empty.say(own.problem, again=True)
         elif self._opening is not None and not self._opening.is_over:
-            self.window.empty.say(STARTS, again=False)
+            self.window.empty.say(self._opening.words, again=False)
         if self._opening is not None:
             self._opening.look(self.desk.selected, window=self.window.isVisible())
 

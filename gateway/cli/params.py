@@ -127,6 +127,7 @@ def apply(argv: list[str]) -> int:
         if not changes:
             return 0
         if not ask(f"Write {counted(len(changes), 'parameter')}?", yes=arguments.yes):
+            warn("params", "nothing was written")
             return 1
         return write(robot, changes, scope.robot, arguments)
 

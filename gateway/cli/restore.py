@@ -2,6 +2,7 @@
 
 from gateway.cli.connect import ask, connect
 from gateway.cli.storage import device_parser, say_stored
+from gateway.cli.text import warn
 
 EPILOG = """Refused in the same cases as gwrms store. The defaults take effect after the device's next
 reset: switch it off and on.
@@ -18,6 +19,7 @@ def main(argv: list[str]) -> int:
     with connect(arguments, "restore") as robot:
         question = f"{arguments.component} loses what was stored in it, and takes its defaults. Go on?"
         if not ask(question, yes=arguments.yes):
+            warn("restore", "nothing was restored")
             return 1
         restored = robot.restore(arguments.component)
     say_stored(restored, json=arguments.json)

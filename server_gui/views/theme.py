@@ -161,6 +161,10 @@ QPushButton#page_name {{ background: transparent; color: {dim}; padding: 7px 11p
 QPushButton#page_name[tight="true"] {{ padding: 7px {tight}px; }}
 QPushButton#page_name:checked {{ color: {text}; border-bottom: 2px solid {accent}; }}
 QPushButton#page_name:focus, QPushButton#page_name:hover {{ color: {text}; background: {card}; }}
+QPushButton#section {{ padding: 2px 8px; }}
+QPushButton#section[tone="bad"] {{ color: {bad}; border-color: {bad}; }}
+QPushButton#section[tone="warn"] {{ color: {warn}; border-color: {warn}; }}
+QPushButton#section[tone]:checked {{ color: {on_accent}; }}
 QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
     font-weight: bold; padding: 6px 14px; }}
 QPushButton#stop:pressed {{ background: #7d0a1d; }}

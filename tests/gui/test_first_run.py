@@ -23,6 +23,7 @@ from server_gui.views.robots.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.faulty import fault
+from tests.gui.rules import settle
 from tests.gui.running import wait
 from tests.support.desk import walking
 
@@ -299,7 +300,7 @@ def test_stop_demo_and_tour_are_whole_on_small_screens(
 # --- the splash
 
 
-def test_the_splash_says_which_step_is_done_and_closes_when_the_robot_walks(
+def test_the_splash_says_which_step_is_done_and_ends_as_the_window_is_there_which_says_the_rest(
     qt: QApplication, theme: Theme, bench: Bench
 ) -> None:
     own, steps = Running(), FirstSteps()
@@ -315,10 +316,13 @@ def test_the_splash_says_which_step_is_done_and_closes_when_the_robot_walks(
     own.ready = (RobotPart.SIMULATOR, RobotPart.GATEWAY)
     opening.look(bench.desk.stations[0], window=True)
     assert steps.now is FirstStep.DATA  # nothing has come of the robot yet
-    assert splash.isVisible()
+    assert not splash.isVisible(), "it would lie over the window"
+    assert not opening.is_over
+    assert opening.words.endswith("Next: First data from every component")
     for step in FirstStep:
         steps.reach(step)
     opening.look(bench.desk.stations[0], window=True)
+    assert opening.is_over
     assert not splash.isVisible()
     destroy(splash)
 
@@ -335,3 +339,20 @@ def test_a_start_that_fails_or_a_click_ends_the_splash(qt: QApplication, theme: 
     QTest.mouseClick(splash, Qt.MouseButton.LeftButton)
     assert not splash.isVisible()
     destroy(splash)
+
+
+def test_beside_the_demos_bar_a_small_laptop_shows_all_of_the_overview(
+    demo: Demo, window: MainWindow, bench: Bench
+) -> None:
+    window.resize(1366, 768)
+    bench.station.take([walking(300, age_s=-3600.0)])
+    for is_touring in (True, False):
+        for _ in range(3):
+            demo.draw()
+            settle()
+        assert demo.bar.tour.isVisible() is is_touring
+        assert demo.bar.said.isVisible() is not is_touring
+        assert demo.bar.height() <= 40
+        click(demo.bar.tour.skip)
+    assert window.tabs.overview.sections.isHidden()
+    assert min(plot.plot._lines.height() for plot in window.tabs.overview._plots) >= 70

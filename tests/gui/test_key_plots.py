@@ -148,6 +148,23 @@ def test_a_limit_is_a_line_where_it_is_in_sight_and_so_is_where_the_guard_trips(
     assert len(angle.plot._marks._shown.limits) == 2
 
 
+def test_a_limit_beyond_the_range_is_an_arrow_at_its_edge_and_is_said_to_be_there(
+    overview: Overview, bench: Bench
+) -> None:
+    torque = overview._plots[1]
+    assert torque.plot._marks._shown.limits == ()
+    assert torque.plot._marks._shown.beyond == (0.0, 1.0), "above and below"
+    assert [glyph for _, glyph, text in torque.legend._parts if "80" in text] == ["↕"]
+    newest_ns = bench.station.rings.newest_ns or 0
+    stamps_ns = [newest_ns + (row + 1) * 10_000_000 for row in range(50)]
+    columns: dict[str, list[float | None]] = {"left_knee.torque": [90.0] * 50}
+    bench.station.take([telemetry(stamps_ns, columns, time.monotonic_ns() + round(HOUR_S * 1e9))])
+    draw(overview)
+    draw(overview)
+    assert list(torque.plot._marks._shown.beyond) == [1.0]
+    assert [glyph for _, glyph, text in torque.legend._parts if "80" in text] == ["┅"]
+
+
 def test_what_happened_is_flagged_in_every_plot_at_its_instant(overview: Overview, bench: Bench) -> None:
     newest_ns = bench.station.rings.newest_ns or 0
     bench.station.flags.add(Flag(newest_ns - 5 * 10**9, "stop F12 by jkim", FlagKind.STOP))

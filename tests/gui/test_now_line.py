@@ -86,3 +86,16 @@ def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, ben
     drives = overview.now.drives
     assert (drives.main.text(), drives._icon._mark.colour) == ("STOP NOT CONFIRMED", "bad")
     assert drives.detail.text() == "operation enabled · 6 of 6 enabled"
+
+
+def test_the_first_line_says_which_drive_is_the_warmest(overview: Overview, bench: Bench) -> None:
+    received_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {f"{joint}.temperature": [40.0] for joint in JOINTS}
+    columns["right_knee.temperature"] = [61.4]
+    columns["left_hip.temperature"] = [None]
+    bench.station.take([walking(10), looked(), telemetry([received_ns], columns, received_ns)])
+    overview.read_now()
+    overview.refresh()
+    said = overview.now.drives.detail._wordings
+    assert said[0].endswith(" of 6 enabled · warmest: right knee 61 °C")
+    assert said[-1].endswith(" of 6 enabled"), "where that has no room"

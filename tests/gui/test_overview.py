@@ -459,3 +459,18 @@ def test_the_order_of_the_overview_stays_as_alarms_and_lines_come_and_go(
         bench.draw(window)
         orders.add(page._joints.y() < page._status.y())
     assert orders == {is_first}
+
+
+@pytest.mark.parametrize("side", [150, 190, 240, 400])
+def test_letters_in_the_ring_are_read_and_as_large_whatever_phase_it_is(theme: Theme, side: int) -> None:
+    ring = GaitRing(theme)
+    ring.setFixedSize(theme.px(side), theme.px(side))
+    sizes = []
+    for phase in ("pre-swing", "terminal stance"):
+        known: Phases = dict.fromkeys(Leg, LegPhase(100.0, phase))
+        ring.show_phases(known, known, "Walk 94 %", "120 steps/min", live=True)
+        ring.grab()
+        sizes.append(ring.letters)
+    assert sizes[0] == sizes[1]
+    assert min(sizes[0]) >= theme.text_font(0.75).pointSizeF()
+    destroy(ring)

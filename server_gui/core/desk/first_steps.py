@@ -3,6 +3,9 @@
 import time
 from collections.abc import Callable, Sequence
 from enum import Enum
+from typing import Final
+
+STARTS: Final = "The simulated robot is starting; this takes a few seconds …"
 
 
 class FirstStep(Enum):

@@ -64,7 +64,7 @@ class _Gathered:
 
 
 def lessons(url: str, task: str, robot: str = "") -> Lessons:
-    """Return what is labelled for a task, of one robot or all; blocks. Errors of the store are its problem."""
+    """Return what is labelled for a task, of one robot or all; blocks. A broken store is its problem."""
     try:
         store = Store.existing(url)
         with translated(f"{url}/{LABELS.name} cannot be read"):

@@ -222,7 +222,7 @@ class EventsPanel(QWidget):
         self._column.insertWidget(0, self.tools)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(self._theme.px(120), self._theme.px(60))
+        return QSize(self._theme.px(120), self._theme.px(40))
 
     def _choose(self) -> None:
         self._news.choose(CHOICES[self.kinds.currentText()], self.words.text().lower().split())

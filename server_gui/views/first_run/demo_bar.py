@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QPushButton, QToolBar, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QMenu, QPushButton, QToolBar, QWidget
 
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.desk.station import Station
@@ -22,6 +23,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
 ENDS: Final = " (which also ends the stop that is held)"
+WIDE: Final = 1200  # at text of 100 %: the tour has room beside the buttons
 REPAIR: Final = "Repair all"
 WALKING: Final = "It walks, with every drive enabled"
 WALKS: Final = "Tells the simulated controller to start and the wearer to walk, as after a stop or a fault"
@@ -48,6 +50,7 @@ class DemoBar(QToolBar):
     ) -> None:
         super().__init__("Simulated robot")
         self._own, self._control, self._station = own, control, station
+        self._theme = theme
         self._kept = window.kept
         self._deliver = deliver
         self._asking = Background("simulator")
@@ -102,26 +105,43 @@ class DemoBar(QToolBar):
         self.breaking.setToolTip("The simulator's faults by name, as gwrms sim-fault makes them")
         self.tour.left.connect(self._toured)
         row = QHBoxLayout()
-        row.setContentsMargins(10, 0, 10, 2)
+        row.setContentsMargins(10, 0, 10, 0)
         row.setSpacing(6)
         for button in (self.walk, self.breaking, self.mend, self.again):
+            button.setObjectName("section")  # low: what is below needs the height
             row.addWidget(button)
         row.addWidget(self.said, 1)
         page = QWidget()
         page.setObjectName("dock")
-        column = QVBoxLayout(page)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(self.tour)
+        self._way = QBoxLayout(QBoxLayout.Direction.TopToBottom, page)
+        self._way.setContentsMargins(0, 0, 0, 0)
+        self._way.setSpacing(0)
+        self._way.addLayout(row)
+        self._way.addWidget(self.tour, 1)
         self.addWidget(page)
+        if (around := self.layout()) is not None:
+            around.setContentsMargins(0, 0, 0, 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Have the tour beside the buttons where the window is wide, else below them."""
+        is_wide = self.width() >= self._theme.px(WIDE)
+        way = QBoxLayout.Direction.LeftToRight if is_wide else QBoxLayout.Direction.TopToBottom
+        if way is not self._way.direction():
+            self._way.setDirection(way)
+        self.said.setVisible(not is_wide or self.tour.isHidden())
 
     def _begin_tour(self) -> None:
         self.again.setEnabled(False)
         self.tour.begin()
+        self._fit()
 
     def _toured(self) -> None:
         self.again.setEnabled(True)
+        self._fit()
         self._kept.setValue(TOURED, True)
 
     def _words(self, *, held: bool) -> str:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Final
 
-from server_gui.core.desk.first_steps import FirstStep, FirstSteps
+from server_gui.core.desk.first_steps import STARTS, FirstStep, FirstSteps
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.simulated import RobotPart
 from server_gui.views.first_run.splash import Splash
@@ -23,6 +23,12 @@ class Opening:
         self._splash = splash
         self.is_over = False
 
+    @property
+    def words(self) -> str:
+        """What the window says meanwhile."""
+        step = self._steps.now
+        return STARTS if step is None else f"{STARTS} Next: {step.value}"
+
     def look(self, station: "Station | None" = None, *, window: bool = False) -> None:
         """Count what is so; `window`: it is there."""
         if self.is_over:
@@ -31,7 +37,7 @@ class Opening:
             self._steps.reach(STEPS[part])
         if window and FirstStep.WINDOW not in self._steps.took_s:
             self._steps.reach(FirstStep.WINDOW)
-            self._splash.raise_()  # the window has come to lie above it
+            self._splash.close()  # it would lie over the window, which says the rest itself
         if station is not None and station.robot.parts and station.is_live:
             self._steps.reach(FirstStep.DATA)
             if station.processing.derived().gait.walking:

@@ -1,4 +1,4 @@
-"""Splash screen until the simulated robot walks: the finished and the present step.
+"""Splash screen until the window is there: the finished and the present step.
 
 It imports nothing but Qt and the theme, so that it is there before the rest of the window is.
 """

@@ -105,11 +105,11 @@ class Tour(QWidget):
         self.next.clicked.connect(lambda: self.go(self.at + 1))
         self.skip.clicked.connect(self.end)
         row = QHBoxLayout(self)
-        row.setContentsMargins(10, 0, 10, 3)
+        row.setContentsMargins(10, 0, 10, 0)
         row.setSpacing(6)
         row.addWidget(self.words, 1)
         for button in (self.back, self.next, self.skip):
-            row.addWidget(button)
+            row.addWidget(button, 0, Qt.AlignmentFlag.AlignVCenter)
         self.hide()
 
     def begin(self) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 
 from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
+from server_gui.core.desk.first_steps import STARTS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plain import PlainLabel
@@ -20,7 +21,6 @@ HINT = "Robots that are to be followed at every start go into ~/.config/gwrms/se
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
 COMMISSION = "Make a robot's file for unknown drives: answer questions, and move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
-STARTS = "The simulated robot is starting; this takes a few seconds …"
 
 
 class EmptyView(QWidget):

@@ -61,7 +61,7 @@ ENABLED: Final = "operation enabled"  # only then it is to be where its target i
 NONE: Final = "–"
 NOT_KNOWN: Final = "not known"
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
-BELOW: Final = "↓"  # its words stand there
+BELOW, ABOVE = "↓", "↑"  # where its words stand
 HINT: Final = (
     "Time from the latest STOP until this drive reported a state other than enabled, or confirmed it. "
     "“already off”: it was not enabled before that STOP. “no proof”: it has not reported such a state since"
@@ -199,12 +199,13 @@ class BarDelegate(SentenceDelegate):
         super().__init__(ERROR)
         self._theme = theme
         self.is_short = self.is_tight = False
+        self.pointer = BELOW
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)
         text = str(index.data())
         if self.is_short and index.column() == ERROR and text not in (NONE, NOT_KNOWN):
-            option.text = text.partition(" ")[0] if text.startswith("0x") else BELOW
+            option.text = text.partition(" ")[0] if text.startswith("0x") else self.pointer
         elif self.is_tight and index.column() == STATE:
             option.text = in_few_words(text)
         if isinstance(index.data(BAR), Bar):  # which lies below it
@@ -259,6 +260,10 @@ class JointTable(QTableView):
     def sizeHint(self) -> QSize:
         rows = max(self._model.rowCount(), 1) * self.verticalHeader().defaultSectionSize()
         return QSize(self._theme.px(600), rows + self.horizontalHeader().sizeHint().height() + 2)
+
+    def point_to_words(self, *, above: bool) -> None:
+        """Say where the words stand that have no room in their column."""
+        self._bars.pointer = ABOVE if above else BELOW
 
     @property
     def unsaid(self) -> list[tuple[str, str]]:

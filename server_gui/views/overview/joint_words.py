@@ -1,4 +1,4 @@
-"""What stands below the joint table: errors whose words have no room in it; else what its bars mean."""
+"""What stands beside the joint table: errors whose words have no room in it; else what its bars mean."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -40,7 +40,7 @@ class JointWords(PlainLabel):
         self.setAccessibleName("Problems of joints")
         self.setWordWrap(True)
         self.setObjectName("dim")
-        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._fit)
         self._fit()

@@ -22,12 +22,19 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
-AT_START: Final = "limit at the start "
+SEEN: Final = ("limit ", "limit ", "")  # before limits in the legend, the fullest first
+BEYOND: Final = ("beyond the plot: limit ", "limit ", "")  # likewise, of those that are out of its range
+# Likewise, where nobody knows of changes since the beginning of a recording.
+SEEN_AT_START: Final = ("limit at the start ", "start ", "start ")
+BEYOND_AT_START: Final = ("beyond the plot: limit at the start ", "start ", "start ")
+HINT: Final = (
+    "Wheel: time · double click: all of it · click: open in Signals. "
+    "┅ limit: its line · ↕ limit: beyond the range, where an arrow stands at the edge"
+)
 LETTERS: Final = {"left": "L", "right": "R"}  # alone in their colours, as on the cards beside it
 AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a flag
 
 
-Wordings = tuple[tuple[str, Mapping[str, str]], ...]  # of the limit, and of the curves
 Part = tuple[str, str, str]  # of the legend: colour, what is drawn, what it says
 
 
@@ -60,7 +67,7 @@ class KeyPlot(Card):
         self.plot = Plot(theme, SECONDS, self._unit.scale * kind.least, Mouse.TIME)
         self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in self._curves])
         self.plot.setAccessibleName(kind.title)
-        self.plot.setToolTip("Wheel: time · double click: all of it · click: open in Signals")
+        self.plot.setToolTip(HINT)
         self.body.addWidget(self.legend)
         self.body.addWidget(self.plot, 1)
         self._hover: float | None = None
@@ -104,18 +111,21 @@ class KeyPlot(Card):
         values = self._values(station)
         told = {word: unit.text(value) for (_, _, word), value in zip(self._curves, values, strict=True)}
         inks = [css(self._theme, colour if live else "old") for _, colour, _ in self._curves]
-        limits = _limit_texts(self._limits(station), unit)
+        seen, beyond = self._limits_told(station, unit)
+        at_start = bool(_at_start(station))
+        of_seen, of_beyond = (SEEN_AT_START, BEYOND_AT_START) if at_start else (SEEN, BEYOND)
 
-        def parts(texts: Collection[str], limit: str, words: Mapping[str, str]) -> list[Part]:
+        def parts(texts: Collection[str], wording: int, words: Mapping[str, str]) -> list[Part]:
             named, drawn = zip(inks, self._curves, texts, strict=True), "" if words else "━"
             curves = [(ink, drawn, f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
-            return [*curves, (css(self._theme, "bad"), "┅", f"{limit}{limits}")] if limits else curves
+            bad = css(self._theme, "bad")
+            lines = [(bad, "┅", f"{of_seen[wording]}{seen}")] if seen else []
+            return [*curves, *lines, *([(bad, "↕", f"{of_beyond[wording]}{beyond}")] if beyond else [])]
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
-        whose = (AT_START, "start ") if _at_start(station) else ("limit ", "")
-        wordings: Wordings = (whose[0], dict[str, str]()), (whose[1], {}), (whose[1], LETTERS)
+        wordings: tuple[tuple[int, Mapping[str, str]], ...] = (0, {}), (1, {}), (2, {}), (2, LETTERS)
         fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
-        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if _at_start(station) else 1])))
+        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if at_start else 2])))
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
         )
@@ -142,6 +152,13 @@ class KeyPlot(Card):
             return [None] * len(self.channels)
         found = [station.rings.values(name, len(times))[row] for name in self.channels]
         return [None if np.isnan(value) else float(value) for value in found]
+
+    def _limits_told(self, station: Station, unit: Unit) -> tuple[str, str]:
+        """Return the limits with a line in the plot, and those beyond its range."""
+        limits = self._limits(station)
+        near = {limit for limit in limits if self.plot.is_in_range(limit * unit.scale)}
+        seen = [limit for limit in limits if limit in near or -limit in near]  # `±20` is said once
+        return _limit_texts(seen, unit), _limit_texts([one for one in limits if one not in seen], unit)
 
     def _limits(self, station: Station) -> list[float]:
         most = self._held(station, self._kind.most)

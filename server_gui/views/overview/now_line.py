@@ -4,8 +4,9 @@ from typing import Final
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
+from gateway.units import Units, rounded
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -36,10 +37,10 @@ class Fact(QWidget):
             ShrinkingLabel("title"),
             ShrinkingLabel("dim"),
         )
-        words = QVBoxLayout()
+        self._words = words = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         words.setSpacing(0)
         words.addWidget(self.main)
-        words.addWidget(self.detail)
+        words.addWidget(self.detail, 1)
         self.row = QHBoxLayout(self)
         self.row.setContentsMargins(0, 0, 0, 0)
         self.row.setSpacing(8)
@@ -55,6 +56,13 @@ class Fact(QWidget):
         self.detail.say(*detail)
         self.setAccessibleDescription(f"{main[0]}, {detail[0]}")
         set_tip(self, "\n".join(filter(None, (main[0], detail[0], tip))))
+
+    def be_flat(self, is_flat: bool) -> None:
+        """Have both in one line, where there is little room."""
+        way = QBoxLayout.Direction.LeftToRight if is_flat else QBoxLayout.Direction.TopToBottom
+        if way is not self._words.direction():
+            self._words.setDirection(way)
+            self._words.setSpacing(8 if is_flat else 0)
 
     @property
     def wide(self) -> int:
@@ -104,6 +112,7 @@ class NowLine(QFrame):
         self._grid.setHorizontalSpacing(18)
         self._placed: tuple[int, bool] = (0, False)
         self._is_offered = True
+        self.is_flat = False
         self._arrange(2, on_trial=False)
 
     def minimumSizeHint(self) -> QSize:
@@ -118,6 +127,17 @@ class NowLine(QFrame):
         self._is_offered = wanted
         self._decide.setVisible(wanted and self._placed[1])
 
+    def be_flat(self, is_flat: bool) -> None:
+        """Have each fact in one line; what is on trial keeps its two."""
+        self.is_flat = is_flat
+        for fact in (self.drives, self.activity):
+            fact.be_flat(is_flat)
+
+    @property
+    def gain(self) -> int:
+        """How much lower it is where it is flat."""
+        return self.drives.detail.sizeHint().height()
+
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
@@ -127,7 +147,7 @@ class NowLine(QFrame):
         self._fit(on_trial=trial is not None)
         if station is None:
             return
-        self.drives.say(*_drives(station))
+        self.drives.say(*_drives(station, self._desk.shown.units))
         line = activity(station)
         gait = station.processing.derived().gait
         walks = (
@@ -179,7 +199,7 @@ class NowLine(QFrame):
             self._grid.setColumnStretch(column, 1 if column < columns else 0)
 
 
-def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
+def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
@@ -191,7 +211,20 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
-    return mark, (mark.word.capitalize(),), (count,)
+    return mark, (mark.word.capitalize(),), (*_warmest(station, units, count), count)
+
+
+def _warmest(station: Station, units: Units, count: str) -> tuple[str, ...]:
+    """Return which drive is the warmest, behind how many are enabled; nothing where none says so."""
+    told = {joint: station.robot.values.get(f"{joint}.temperature") for joint in station.robot.names("joint")}
+    known = {joint: value for joint, value in told.items() if value is not None}
+    if len(known) < 2:
+        return ()
+    joint = max(known, key=lambda one: known[one])
+    unit = units.unit("temperature", "°C")
+    return (
+        f"{count} · warmest: {joint.replace('_', ' ')} {rounded(known[joint] * unit.scale, 0)} {unit.symbol}",
+    )
 
 
 def _since(station: Station) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """The overview: what is so now, gait phase, posture, pressure of both feet, three plots, and the joints.
 
 Where not all of it is seen at once, the joints come before the pictures: their numbers are never scrolled to.
+Where it has less room still, its sections are on pages: fewer things, and whole.
 """
 
 from collections.abc import Collection
@@ -8,7 +9,7 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
 from server_gui.core.desk.confidence import not_judged
@@ -23,6 +24,8 @@ from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
+from server_gui.views.overview.sections import ALL, Page, Section, SectionBar, arranged
+from server_gui.views.overview.sections import PLOTS as PLOTS_ALONE
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases, step_phases
 from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
@@ -36,8 +39,13 @@ from server_gui.views.widgets.pressure_map import PressureMap
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
-A_COLUMN: Final = 190  # wide at least, at text of 100 %
+A_COLUMN: Final = 178  # wide at least, at text of 100 %
+LOOKS: Final = 2  # at a new size of the window: with the first one, docks may be on their way still
+WORDS_SHARE: Final = 5  # of the joints' title line
+PICTURE_SHARE, PLOT_SHARE = 10, 9  # of the height
 SPARE: Final = 100  # high, likewise: so much must be left for lines and alarms that come
+PICTURE: Final = 141  # high at least, likewise: what the ring says is read
+PLOT: Final = 142  # high at least, likewise: 70 for its curves
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
 OFF_N: Final = 50.0  # a figure that is further off than its picture is read at once
@@ -97,12 +105,23 @@ class Overview(QWidget):
         self._table = JointTable(self._model, theme)
         self._joints.body.addWidget(self._table)
         self._wrong = JointWords(theme)
-        self._joints.body.addWidget(self._wrong)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(6, 6, 6, 6)
-        self._grid.setSpacing(6)
+        self._grid.setContentsMargins(6, 3, 6, 3)
+        self._grid.setHorizontalSpacing(6)
+        self._grid.setVerticalSpacing(4)
+        self.sections = SectionBar(theme)
+        self.sections.chosen.connect(self._choose)
+        self._pages, self._page = ALL, ALL[0]
+        self._cards: dict[Section, list[Card]] = {
+            Section.JOINTS: [self._joints],
+            Section.WEARER: [self._status, self._posture, self._pressure],
+            Section.PLOTS: [*self._plots],
+        }
+        for card in (card for cards in self._cards.values() for card in cards):
+            card.setParent(self)  # else it would be shown as a window of its own
         self._columns, self._is_plots, self._is_low = 0, False, False
         self._ordered_for: object = None
+        self._looks = 0  # at this size
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -115,17 +134,21 @@ class Overview(QWidget):
             self._arrange(self._fitting)
 
     def _order(self) -> None:
-        """Put the joints where they belong in a window of this size.
+        """Put the joints where they belong in a window of this size, and on pages what has no room.
 
         As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
         """
-        size, rows = self.window().size(), self._model.rowCount()
-        room = size, self._theme.scale, rows, self._columns, self.is_numbers_first
-        if room != self._ordered_for:
-            self._ordered_for = room
-            is_low = self._is_too_low()
-            if is_low is not self._is_low:
-                self._is_low = is_low
+        window, bars = self.window(), self.window().findChildren(QToolBar)  # the demo's
+        high = window.height() - sum(bar.height() for bar in bars if bar.isVisible())
+        rows, is_first = self._model.rowCount(), self.is_numbers_first
+        room = window.width(), high, self._theme.scale, rows, self._columns, is_first
+        looks = 1 if room != self._ordered_for else self._looks
+        if looks <= LOOKS:
+            self._ordered_for, self._looks = room, looks + 1
+            is_low, pages = self._is_too_low(), self._fitting_pages()
+            if is_low is not self._is_low or pages != self._pages:
+                self._is_low, self._pages = is_low, pages
+                self._page = next((page for page in pages if page == self._page), pages[0])
                 self._arrange(self._fitting)
 
     def _is_too_low(self) -> bool:
@@ -133,7 +156,43 @@ class Overview(QWidget):
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return False
-        return seen.height() - self._grid.totalMinimumSize().height() < self._theme.px(SPARE)
+        needed = sum(self._needs().values()) + self._around
+        return seen.height() - needed < self._theme.px(SPARE)
+
+    def _fitting_pages(self) -> tuple[Page, ...]:
+        """Return the pages on which everything is whole."""
+        seen = self.parentWidget()
+        if seen is None or not self.is_numbers_first:
+            return ALL
+        gain = self.now.gain if self._columns > 1 else 0
+        bar, between = self.sections.sizeHint().height() - gain, self._grid.verticalSpacing()
+        return arranged(self._needs(), seen.height() - self._around, bar, between)
+
+    @property
+    def _around(self) -> int:
+        """How high all is that is on every page."""
+        margins = self._grid.contentsMargins()
+        line = self.now.minimumSizeHint().height() + (self.now.gain if self.now.is_flat else 0)
+        return margins.top() + margins.bottom() + line
+
+    def _needs(self) -> dict[Section, int]:
+        """How high each section is at least (pixels)."""
+        px, between, rows = self._theme.px, self._grid.verticalSpacing(), -(-len(SHARES) // self._columns)
+        pictures = (self._posture, self._pressure)  # lines of the wearer come and go
+        picture = max(px(PICTURE), *(card.minimumSizeHint().height() for card in pictures))
+        plot = max(px(PLOT), *(card.minimumSizeHint().height() for card in self._plots))
+        return {
+            Section.JOINTS: self._joints.minimumSizeHint().height(),
+            Section.WEARER: rows * picture + (rows - 1) * between,
+            Section.PLOTS: rows * plot + (rows - 1) * between,
+        }
+
+    def _choose(self, page: Page) -> None:
+        """Show this page."""
+        self._page = page
+        self._arrange(self._fitting)
+        self.read_now()
+        self.refresh()
 
     @property
     def _fitting(self) -> int:
@@ -145,8 +204,6 @@ class Overview(QWidget):
         self.now.setVisible(with_now)
         if alone is not self._is_plots:
             self._is_plots = alone
-            for card in (self._status, self._posture, self._pressure, self._joints):
-                card.setVisible(not alone)
             self._arrange(self._fitting)
 
     def minimumSizeHint(self) -> QSize:
@@ -156,22 +213,52 @@ class Overview(QWidget):
     def _arrange(self, columns: int) -> None:
         """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
-        self._wrong.be_high(1 if columns == len(SHARES) else 2)  # a line is enough for an error
+        self._place_words(columns)
+        self.now.be_flat(len(self._pages) > 1 and columns > 1)
+        self.sections.show_pages(ALL if self._is_plots else self._pages, self._page)
         grid.addWidget(self.now, 0, 0, 1, columns)
-        cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
-        first = 2 if self._is_low else 1
-        for place, card in enumerate((*cards, *self._plots)):
-            grid.addWidget(card, first + place // columns, place % columns)
-        last = first + -(-(len(cards) + len(self._plots)) // columns)
-        joints = 1 if self._is_low else last
+        grid.addWidget(self.sections, 1, 0, 1, columns)
+        cards = self._cards_of_page()
+        first = 3 if self._is_low else 2
+        for place, card in enumerate(cards):
+            row, column = divmod(place, columns)
+            span = columns - column if place == len(cards) - 1 else 1
+            grid.addWidget(card, first + row, column, 1, span)
+        last = first + -(-len(cards) // columns)
+        joints = 2 if self._is_low else last
         grid.addWidget(self._joints, joints, 0, 1, columns)
         for column, share in enumerate(SHARES):
             grid.setColumnStretch(column, share if column < columns else 0)
-        for row in range(9):
-            is_plots = (row - first) * columns >= len(cards)
-            grid.setRowStretch(row, 0 if row in (0, joints) or row >= last else 6 if is_plots else 10)
+        plots = next((place for place, card in enumerate(cards) if card in self._plots), len(cards))
+        is_alone = self._joints.isVisibleTo(self) and not cards
+        for row in range(10):
+            is_plots = (row - first) * columns >= plots
+            is_fixed = row < 2 or row == joints or row >= last
+            share = PLOT_SHARE if is_plots and not self._is_low else PICTURE_SHARE
+            grid.setRowStretch(row, 0 if is_fixed else share)
+        grid.setRowStretch(9, 1 if is_alone else 0)
         for one in (self._joints, self):  # else a frame is drawn in which words lie over the table
             QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
+
+    def _place_words(self, columns: int) -> None:
+        """Put what is said of the joints into their title's line, or below the table where that is narrow."""
+        is_wide = columns == len(SHARES)
+        self._wrong.be_high(1 if columns > 1 else 2)  # a line is enough for an error
+        self._table.point_to_words(above=is_wide)
+        if is_wide:
+            self._joints.head.insertWidget(1, self._wrong, WORDS_SHARE)
+        else:
+            self._joints.body.addWidget(self._wrong)
+
+    def _cards_of_page(self) -> list[Card]:
+        """Return the cards of the page that stand beside each other; hide those of the others."""
+        page = PLOTS_ALONE if self._is_plots else self._page
+        found: list[Card] = []
+        for section, cards in self._cards.items():
+            for card in cards:
+                card.setVisible(section in page)
+            found += cards if section in page and section is not Section.JOINTS else []
+        return found
 
     def read_now(self) -> None:
         """Let the next frame show also what is read: what stands beside it is shown anew then."""
@@ -200,6 +287,7 @@ class Overview(QWidget):
         if slow:
             self._model.refresh()
             self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
+            self.sections.say([joint for joint, _ in self._model.errors], self._table.tone)
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots

@@ -162,7 +162,7 @@ class ParametersPanel(QWidget):
             self.review.show_changes(station.difference(self._desk.shown.units), _acts(station))
             self.pages.setCurrentIndex(REVIEW)
             # The button that led here gives way: else the next one in the window would have the keyboard.
-            self.review.table.setFocus(Qt.FocusReason.OtherFocusReason)
+            self.review.take_keyboard()
 
     def find_parameter(self) -> None:
         """Let words be typed that filter the parameters."""

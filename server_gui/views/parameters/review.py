@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.tuning.edits import ReviewedEdit
+from server_gui.views.parameters.change_blocks import ChangeBlocks, mark_of
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.columns import title_widths
@@ -25,7 +26,6 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "Change", "Allowed", "")
 NAME, OLD, ARROW, NEW, UNIT, BY, ALLOWED, MARK = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, BY, ALLOWED)
-SPARE: Final = (ALLOWED, BY)  # left out in this order where there is less room: no number is cut
 BESIDE: Final = 16  # pixels of the table's frame and its bar
 TRIAL_S: Final = 30
 ALL_OR_NONE: Final = "All or none, read back from the device. Nothing is stored to flash."
@@ -65,6 +65,8 @@ class Review(QWidget):
         for column in range(len(TITLES)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        self.blocks = ChangeBlocks(theme)
+        self.blocks.hide()
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
@@ -98,6 +100,7 @@ class Review(QWidget):
         everything.setContentsMargins(0, 0, 0, 0)
         everything.addWidget(title)
         everything.addWidget(self.table, 1)
+        everything.addWidget(self.blocks, 1)
         everything.addWidget(self.said)
         everything.addWidget(self.leave_out)
         everything.addLayout(row)
@@ -108,6 +111,7 @@ class Review(QWidget):
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):
             self._fill(row, change)
+        self.blocks.show_changes(changes)
         self._fit()
         problems = [f"{change.name}: {change.problem}" for change in changes if change.problem]
         elsewhere = [change.name for change in changes if change.elsewhere]
@@ -133,16 +137,21 @@ class Review(QWidget):
     def _refused(self) -> tuple[str, ...]:
         return tuple(change.name for change in self.changes if change.problem)
 
+    def take_keyboard(self) -> None:
+        """Have the keyboard where the changes are read."""
+        (self.blocks if self.table.isHidden() else self.table).setFocus(Qt.FocusReason.OtherFocusReason)
+
     def _fit(self) -> None:
-        """Leave out whole columns where the name has no room beside them."""
+        """Show the changes below each other where not all of a table has room."""
         titles = title_widths(self.table)
         wide = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
-        shown = set(range(len(TITLES)))
-        for column in SPARE:
-            if sum(wide[known] for known in shown) + BESIDE > self.width():
-                shown.discard(column)
-        for column in range(len(TITLES)):
-            self.table.setColumnHidden(column, column not in shown)
+        is_narrow = sum(wide) + BESIDE > self.width()
+        had_keyboard = self.table.hasFocus() or self.blocks.hasFocus()
+        if self.blocks.isHidden() is is_narrow:
+            self.table.setHidden(is_narrow)
+            self.blocks.setHidden(not is_narrow)
+            if had_keyboard:
+                self.take_keyboard()
 
     def _enable(self, on: bool) -> None:
         self.try_it.setEnabled(on)
@@ -150,7 +159,7 @@ class Review(QWidget):
 
     def _fill(self, row: int, change: ReviewedEdit) -> None:
         old = "–" if change.old is None else change.unit.editable(change.old)
-        mark = "✕ refused" if change.problem else ("⚠ changed elsewhere" if change.elsewhere else "")
+        mark = mark_of(change)
         new, allowed = change.unit.editable(change.new), range_text(*change.allowed, change.unit)
         texts = (change.name, old, "→", new, change.unit.symbol, change.by, allowed, mark)
         for column, text in enumerate(texts):

@@ -8,7 +8,7 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 
 class Card(QFrame):
-    """Put widgets into `body`."""
+    """Put widgets into `body`; into `head`, between title and note, what needs a line."""
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -20,16 +20,16 @@ class Card(QFrame):
         self._title.setMinimumWidth(1)
         self._note = ShrinkingLabel("note")
         self._note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        head = QHBoxLayout()
-        head.addWidget(self._title)
-        head.addWidget(self._note, 1)
+        self.head = QHBoxLayout()
+        self.head.addWidget(self._title)
+        self.head.addWidget(self._note, 1)
         self.body = QVBoxLayout()
         self.body.setContentsMargins(0, 0, 0, 0)
         self.body.setSpacing(4)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(10, 5, 10, 6)
         everything.setSpacing(4)
-        everything.addLayout(head)
+        everything.addLayout(self.head)
         everything.addLayout(self.body, 1)
 
     def set_title(self, title: str, *, whole: bool = False) -> None:

@@ -51,13 +51,14 @@ class CursorLayout:
     hover: float | None = None
     flags: tuple[tuple[float, FlagKind], ...] = ()
     limits: tuple[float, ...] = ()
+    beyond: tuple[float, ...] = ()  # limits that are out of sight: 0 above, 1 below
     box: QRectF | None = None  # in pixels
     words: str = ""  # instead of curves
 
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing to draw."""
-        several = self.at or self.flags or self.limits or self.words
+        several = self.at or self.flags or self.limits or self.beyond or self.words
         return not several and self.box is None and self.hover is None
 
 
@@ -124,6 +125,14 @@ class Cursors(QWidget):
         for share in self._shown.limits:
             y = round(share * (self.height() - 1))
             painter.drawLine(0, y, self.width(), y)
+        side = self._theme.px(5)  # at the left: the newest values are at the right
+        painter.setPen(QPen(self._theme.colour("bad"), 1))
+        for share in self._shown.beyond:  # an arrow at the edge behind which it is
+            tip = round(share * (self.height() - 1))
+            foot = tip + side if share < 0.5 else tip - side
+            painter.drawLine(2, tip, 2 + 4 * side, tip)
+            for x in (2 + side, 2 + 3 * side):
+                painter.drawLine(2 + 2 * side, tip, x, foot)
 
     def _draw_flags(self, painter: QPainter) -> None:
         side = float(self._theme.px(9))

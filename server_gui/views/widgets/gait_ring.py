@@ -5,7 +5,7 @@ A line across a ring is what the steps that were seen say, a dot in it what a mo
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -26,6 +26,7 @@ LETTERS: Final = 0.7  # of a line, high
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
+LONGEST: Final = max((name for name, _ in PHASES), key=len)
 Phases = dict[Leg, LegPhase | None]
 Row = tuple[str, str, float, bool]  # text, colour, size, whether it is bold
 
@@ -40,6 +41,7 @@ class GaitRing(QWidget):
         self._modelled: Phases = dict.fromkeys(Leg)
         self._word, self._below, self._live = "", "", False
         self._key: tuple[object, ...] = ()
+        self.letters: tuple[float, ...] = ()  # how large they were drawn last (points)
         self._drawn = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -143,6 +145,25 @@ class GaitRing(QWidget):
 
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
         rows, line = self._rows(box)
+        # The size of the letters does not change with a phase.
+        widest = [(_widest(text), colour, factor, bold) for text, colour, factor, bold in rows]
+        places, fonts = self._placed(box, widest, line)
+        least = self._theme.text_font(SMALL).pointSizeF()
+        if any(font.pointSizeF() < least for font in fonts.values()):  # without the phases' names, then
+            rows, line = self._rows(box, is_brief=True)
+            places, fonts = self._placed(box, rows, line)
+        self.letters = tuple(font.pointSizeF() for font in fonts.values())
+        for place, (text, colour, factor, bold) in zip(places, rows, strict=True):
+            font = QFont(fonts[factor])
+            font.setBold(bold)
+            painter.setFont(font)
+            painter.setPen(self._theme.colour(colour))
+            painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
+
+    def _placed(
+        self, box: QRectF, rows: Sequence[Row], line: float
+    ) -> tuple[list[QRectF], dict[float, QFont]]:
+        """Return where each line stands, and by their sizes the fonts with which they have room."""
         top = box.center().y() - line * len(rows) / 2
         places: list[QRectF] = []
         fonts: dict[float, QFont] = {}  # of lines that are to be as large, the smallest: both legs are alike
@@ -153,12 +174,7 @@ class GaitRing(QWidget):
             places.append(place)
             font = self._fitting(text, factor, place, bold=bold)
             fonts[factor] = min(fonts.get(factor, font), font, key=QFont.pointSizeF)
-        for place, (text, colour, factor, bold) in zip(places, rows, strict=True):
-            font = QFont(fonts[factor])
-            font.setBold(bold)
-            painter.setFont(font)
-            painter.setPen(self._theme.colour(colour))
-            painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
+        return places, fonts
 
     def _room(self, box: QRectF, top: float, line: float) -> float:
         """Return the width for a line within the inner ring: less above and below."""
@@ -166,10 +182,10 @@ class GaitRing(QWidget):
         off = abs(top + line / 2 - box.center().y()) + line * LETTERS / 2
         return 2 * math.sqrt(max(free**2 - off**2, 0.0))
 
-    def _rows(self, box: QRectF) -> tuple[list[Row], float]:
+    def _rows(self, box: QRectF, *, is_brief: bool = False) -> tuple[list[Row], float]:
         """Return the lines that have room, and how high each is.
 
-        In a small ring the word has its widest part.
+        In a small ring the word has its widest part. Where it `is_brief`, phases have no names.
         """
         size = min(1.6, box.width() / self._theme.px(140))
         is_short = size < SMALL
@@ -177,18 +193,18 @@ class GaitRing(QWidget):
             box.height() / 5.2,
             QFontMetricsF(self._theme.text_font(READ if is_short else 0.8 * size)).height(),
         )
-        plain, bold = (READ, READ) if is_short else (0.9 * size, 1.5 * size)
+        plain, bold = (READ, READ) if is_short else (max(0.9 * size, SMALL), 1.5 * size)
         colour = "text" if self._live else "old"
         legs: list[Row] = []
         for leg in Leg:
             if (now := self._phases[leg] or self._modelled[leg]) is not None:
-                said = self._phase_text(leg, now, box.width(), is_short=is_short)
+                said = self._phase_text(leg, now, box.width(), is_short=is_short or is_brief)
                 legs.append((said, leg.value if self._live else "old", plain, False))
         most = max(1, min(int(box.height() / line), MOST_SHORT if is_short else MOST))
         words: list[Row] = [(one, colour, bold, True) for one in self._word_lines(box, most - len(legs))]
         if is_short:
             return [*legs[:1], *words, *legs[1:]], line
-        below: list[Row] = [(self._below, "dim", 0.95 * size, False)] if self._below else []
+        below: list[Row] = [(self._below, "dim", max(0.95 * size, SMALL), False)] if self._below else []
         return [*words, *below, *legs][:most], line
 
     def _word_lines(self, box: QRectF, most: int) -> list[str]:
@@ -206,7 +222,7 @@ class GaitRing(QWidget):
         """Return the phase, with its name if that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
-        fits = not is_short and self._width(full) <= room
+        fits = not is_short and self._width(_widest(full)) <= room
         return full if fits else f"{letter} {now.percent:.0f} %"
 
     def _is_read(self, text: str, box: QRectF) -> bool:
@@ -223,6 +239,11 @@ class GaitRing(QWidget):
         if width > place.width() > 0:
             font.setPointSizeF(0.98 * font.pointSizeF() * place.width() / width)
         return font
+
+
+def _widest(text: str) -> str:
+    """Return a leg's line with its phase's name as it is where that is the longest; others as they are."""
+    return f"{text[0]}  {LONGEST} 100 %" if text[1:3] == "  " else text
 
 
 def _percent(phase: LegPhase | None) -> str:

@@ -191,8 +191,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._flags = flags
 
     def show_limits(self, limits: Sequence[float]) -> None:
-        """Show lines at these values, as far as they are in the range."""
+        """Show lines at these values, and arrows at the edges for those that are not in the range."""
         self._limits = limits
+
+    def is_in_range(self, value: float) -> bool:
+        """Return whether this value is in the range that is shown."""
+        low, high = self.getViewBox().viewRange()[1]
+        return bool(low <= value <= high)
 
     def set_curves(self, curves: Sequence[Curve]) -> None:
         """Set which lines there are."""
@@ -370,6 +375,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             hover=None if self._hover is None else share(self._hover),
             flags=tuple((share(flag.at), flag.kind) for flag in self._flags if self._is_in_sight(flag)),
             limits=tuple((high - at) / (high - low) for at in self._limits if low <= at <= high),
+            beyond=tuple({0.0 if at > high else 1.0: at for at in self._limits if not low <= at <= high}),
             box=field,
             words=NO_DATA if self._is_blank else "",
         )

@@ -101,6 +101,13 @@ class Hand:
         if not self.can_see(name):
             self.click(panel)
 
+    def turn_to(self, section: str) -> None:
+        """Show this section of the overview, where it is on a page of its own."""
+        buttons = ("Wearer and plots", section)
+        button = next((one for one in buttons if self.can_see(one)), None)
+        if button is not None:
+            self.click(button, exactly=True)
+
     def wheel(self, name: str, *, down: bool = True, place: int = 0) -> None:
         x, y = self.where(name, place)
         self.xdotool("mousemove", str(x), str(y), "click", "5" if down else "4")

@@ -25,6 +25,7 @@ def alive(bench: Bench) -> None:
 def one_glance(bench: Bench) -> None:
     """What people read first, and what a pointer over a plot adds."""
     hand = bench.hand
+    hand.turn_to("Plots")
     if not hand.reach("Knee angle"):
         return
     hand.scroll(3)  # not only its title
@@ -168,6 +169,7 @@ def insole_lost(bench: Bench) -> None:
     hand = bench.hand
     bench.robot.break_("sensor_unplugged", "left_insole")
     hand.sees("lost: left insole")
+    hand.turn_to("Wearer")
     hand.reach("left insole: lost")
     hand.sees("left insole: lost")
     hand.misses("LEFT  0 N")

@@ -30,10 +30,16 @@ def test_store_takes_the_lease_and_says_what_was_done(
 
 @pytest.mark.parametrize(("answer", "status", "done"), [("yes\n", 0, [(0x1011, b"load")]), ("n\n", 1, [])])
 def test_restore_asks_first(
-    storing: Served, monkeypatch: pytest.MonkeyPatch, answer: str, status: int, done: list[tuple[int, bytes]]
+    storing: Served,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    answer: str,
+    status: int,
+    done: list[tuple[int, bytes]],
 ) -> None:
     monkeypatch.setattr("sys.stdin", Terminal(answer))
     assert storing.run("restore", "left_knee") == status
+    assert ("nothing was restored" in capsys.readouterr().err) is (status == 1)
     assert sent(storing) == done
 
 

@@ -1,0 +1,98 @@
+"""Sections of the overview, and the pages that they are on where not all of them have room."""
+
+from collections.abc import Collection, Mapping, Sequence
+from enum import Enum
+from typing import Final
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QPushButton
+
+from server_gui.core.alarms.marks import GLYPHS
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_tone
+
+
+class Section(Enum):
+    """What is shown or left out whole, the most important first."""
+
+    JOINTS = "joints"
+    WEARER = "wearer"  # ring, posture and soles
+    PLOTS = "plots"
+
+
+Page = frozenset[Section]
+JOINTS, WEARER, PLOTS = (frozenset({section}) for section in Section)
+ALL: Final[tuple[Page, ...]] = (JOINTS | WEARER | PLOTS,)
+# The first arrangement that fits is taken; the last whatever room there is.
+ARRANGEMENTS: Final[tuple[tuple[Page, ...], ...]] = (
+    ALL,
+    (JOINTS | WEARER, JOINTS | PLOTS),
+    (JOINTS, WEARER | PLOTS),
+    (JOINTS, WEARER, PLOTS),
+)
+HINT: Final = "Not all of the overview has room at once. Larger window, smaller text or F9: more of it"
+
+
+def arranged(needs: Mapping[Section, int], room: int, bar: int, between: int) -> tuple[Page, ...]:
+    """Return the pages for so much `room`, of which the `bar` that chooses one takes some (pixels)."""
+    for pages in ARRANGEMENTS:
+        left = room - (bar + between if len(pages) > 1 else 0)
+        if all(sum(needs[one] + between for one in page) <= left for page in pages):
+            return pages
+    return ARRANGEMENTS[-1]
+
+
+def name_of(page: Page, pages: Sequence[Page]) -> str:
+    """Return what a page is called: by what is not on all of them."""
+    everywhere = frozenset.intersection(*pages)
+    return " and ".join(one.value for one in Section if one in page - everywhere).capitalize()
+
+
+class SectionBar(QFrame):
+    """A button for each page, `chosen` tells its sections; hidden where all of them are in sight."""
+
+    chosen = Signal(object)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._pages: tuple[Page, ...] = ()
+        self.setAccessibleName("Pages of the overview")
+        self.buttons: list[QPushButton] = []
+        self._group = QButtonGroup(self)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(4)
+        for place, section in enumerate(Section):
+            button = QPushButton(section.value.capitalize())
+            button.setObjectName("section")
+            button.setCheckable(True)
+            button.setToolTip(HINT)
+            button.clicked.connect(lambda _on, place=place: self.chosen.emit(self._pages[place]))
+            self._group.addButton(button)
+            self._row.addWidget(button, 1)
+            self.buttons.append(button)
+        self.hide()
+
+    def show_pages(self, pages: tuple[Page, ...], shown: Page) -> None:
+        """Show a button for each of them, where there are several."""
+        self._pages = pages
+        for place, button in enumerate(self.buttons):
+            button.setVisible(place < len(pages))
+            button.setChecked(place < len(pages) and pages[place] == shown)
+        self.setVisible(len(pages) > 1)
+        self.say((), "")
+
+    def say(self, wrong: Collection[str], tone: str) -> None:
+        """Say on the button of joints which ones are not well: they may be on the page behind it."""
+        if len(self._pages) < 2:
+            return
+        is_behind = Section.JOINTS not in frozenset.intersection(*self._pages)
+        for button, page in zip(self.buttons, self._pages, strict=False):
+            text, is_bad = name_of(page, self._pages), False
+            if wrong and is_behind and Section.JOINTS in page:
+                which, is_bad = next(iter(wrong)) if len(wrong) == 1 else f"{len(wrong)} not ok", True
+                text = f"{GLYPHS['square' if tone == 'bad' else 'triangle']} {text}: {which}"
+            if button.text() != text:
+                button.setText(text)
+            set_tone(button, tone if is_bad else "")

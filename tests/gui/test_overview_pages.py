@@ -1,0 +1,102 @@
+"""Where the overview has no room for everything, its sections are on pages, each of them whole."""
+
+import pytest
+from PySide6.QtWidgets import QScrollArea
+
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.overview.page import Overview
+from server_gui.views.overview.sections import ALL, JOINTS, PLOTS, WEARER, Page, Section, arranged, name_of
+from server_gui.views.theme import Theme
+from tests.gui import rules
+from tests.gui.fakes import Bench
+from tests.support.desk import looked, walking
+
+NEEDS = {Section.JOINTS: 190, Section.WEARER: 150, Section.PLOTS: 140}
+LEAST_CURVES = 70  # pixels high, at text of 100 %
+
+
+def scrolled(page: Overview) -> int:
+    """How far it can be scrolled, down and across."""
+    seen = page.parentWidget()
+    area = None if seen is None else seen.parentWidget()
+    assert isinstance(area, QScrollArea)
+    return area.verticalScrollBar().maximum() + area.horizontalScrollBar().maximum()
+
+
+def settle(window: MainWindow, bench: Bench) -> None:
+    """Let docks and pages find their places."""
+    for _ in range(3):
+        bench.draw(window)
+        rules.settle()
+
+
+@pytest.mark.parametrize(
+    ("room", "pages"),
+    [
+        (500, ALL),
+        (380, (JOINTS | WEARER, JOINTS | PLOTS)),
+        (340, (JOINTS, WEARER | PLOTS)),
+        (240, (JOINTS, WEARER, PLOTS)),
+        (0, (JOINTS, WEARER, PLOTS)),
+    ],
+)
+def test_sections_that_have_room_together_are_on_one_page(room: int, pages: tuple[Page, ...]) -> None:
+    assert arranged(NEEDS, room, bar=22, between=5) == pages
+    assert frozenset.union(*pages) == ALL[0], "each is on some page"
+    names = [name_of(page, pages) for page in pages]
+    assert len(set(names)) == len(names)
+
+
+def test_a_small_laptop_shows_all_of_the_overview_with_curves_that_can_be_read(
+    window: MainWindow, bench: Bench
+) -> None:
+    window.resize(1366, 768)
+    bench.station.take([walking(300), looked()])
+    settle(window, bench)
+    page = window.tabs.overview
+    assert page.sections.isHidden()
+    assert scrolled(page) == 0
+    assert min(plot.plot._lines.height() for plot in page._plots) >= LEAST_CURVES
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "names"),
+    [(1366, 768, ["Wearer", "Plots"]), (1024, 700, ["■ Joints: left knee", "Wearer and plots"])],
+)
+def test_with_large_text_each_page_is_whole_and_a_joint_in_trouble_is_named_on_all_of_them(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, names: list[str]
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(width, height)
+    bench.station.take([walking(300), looked(state="fault", problem="overcurrent, 0x2310")])
+    page = window.tabs.overview
+    settle(window, bench)
+    for button, page_shown in zip(page.sections.buttons, page._pages, strict=False):
+        button.click()
+        bench.draw(window)
+        rules.settle()
+        assert page._page == page_shown
+        assert scrolled(page) == 0
+        assert page._joints.isVisible() is (Section.JOINTS in page_shown)
+        assert [one.text() for one in page.sections.buttons if not one.isHidden()] == names
+    said = page._wrong.text() if page._joints.isVisible() else page.sections.buttons[0].text()
+    assert "left knee" in said
+
+
+def test_the_chosen_page_stays_as_alarms_come_and_go_and_shows_what_is_so_now(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    bench.station.take([walking(300), looked()])
+    page = window.tabs.overview
+    settle(window, bench)
+    assert page.sections.buttons[0].text() == "Joints"
+    page.sections.buttons[1].click()
+    assert page._page == WEARER | PLOTS
+    assert page._plots[0].legend.text()
+    bench.look_again([looked(state="fault", problem="overcurrent, 0x2310")])
+    bench.draw(window)
+    assert page._page == WEARER | PLOTS
+    assert page._plots[0].isVisible()
+    assert not page._joints.isVisible()
