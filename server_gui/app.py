@@ -49,6 +49,8 @@ from server_gui.views.frame.x11_keys import NoX, X11Keys
 from server_gui.views.refresh_rate import SLOW
 from server_gui.views.theme import Look, Theme
 
+BY_KEY = "STOP key of the window"
+ALL_BY_KEY = "STOP ALL key of the window"
 FRAME_MS: Final = 33
 SWITCH_S: Final = 0.0005  # a thread that wakes up gets Python within this, however busy the window is
 FOLLOWING: Final = FollowSettings(
@@ -151,13 +153,14 @@ class App:
         self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)
         self.window.tabs.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
-        self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
+        self.window.stop_all.connect(lambda: self.stop_all("STOP ALL of the window"))
         self.window.added.connect(self._add)
         self.window.removed.connect(self.leave)
         self.window.simulator.connect(self._own.start)
         self.window.closed.connect(qt.quit)
         self._keys = StopKeys(qt)
-        self._keys.pressed.connect(lambda: self.stop("STOP key of the window"))
+        self._keys.pressed.connect(lambda: self.stop(BY_KEY))
+        self._keys.all_pressed.connect(lambda: self.stop_all(ALL_BY_KEY))
         self._timer = QTimer(interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
         self._robots = settings.robots
@@ -240,6 +243,13 @@ class App:
             self.commissioning.stop()
         if (station := self.desk.selected) is not None:
             self._stop(station.name, reason)
+
+    def stop_all(self, reason: str) -> None:
+        """STOP every robot, and one that is commissioned; from any thread."""
+        if self.commissioning.runs:
+            self.commissioning.stop()
+        stops = self.desk.send_stop_all(reason)
+        self._poster.deliver(lambda: self.desk.note_stop_all(stops))
 
     def _keep(self, robot: str, told: EditEvidence) -> None:
         report = self.desk.recording.link(self._stations[robot].address)
@@ -372,7 +382,7 @@ def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X
     if qt.platformName() != "xcb":
         return contextlib.nullcontext()
     try:
-        keys = X11Keys(int(app.window.winId()), lambda: app.stop("STOP key of the window"))
+        keys = X11Keys(int(app.window.winId()), lambda: app.stop(BY_KEY), lambda: app.stop_all(ALL_BY_KEY))
     except NoX:
         return contextlib.nullcontext()
     app.feeds.others.add(keys.worker)

@@ -41,6 +41,7 @@ class Stopping:
     ) -> None:
         """`asked`: the controlword went another way already."""
         self.read_ns = 0  # when the first of the reads was begun that confirm it
+        self.state: DriveState | None = None  # as the drive has said last
         self._controlword = controlword
         self._confirmed_by = confirmed_by
         self._timeout_s = timeout_s
@@ -84,7 +85,7 @@ class Stopping:
         """Return whether the bus is open. Any answer but that the axis stops is asked for again."""
         began_ns = time.monotonic_ns()
         try:
-            state = axis.state(self._take_patience(axis))
+            state = self.state = axis.state(self._take_patience(axis))
             self._answered = True
             self._reads = self._reads + 1 if state in self._confirmed_by else 0
         except DeviceAbort:

@@ -1,9 +1,10 @@
 """Commissioning for other programs: what is said and asked as JSON lines, and lines that answer.
 
 Out come, a line each: `{"say": …}`, `{"ask": …, "number": …, …}`, `{"live": […], "number": …}` while a
-question waits, `{"steps": […]}`, at the end `{"written": …}`; `{"stopped": …}` after a stop. In go plain
-lines, each the answer to the next question; or `{"answer": …, "number": …}`, which answers that question
-alone and is passed over where it comes late or twice; or `{"stop": true}` at any time.
+question waits, `{"steps": […]}`, at the end `{"written": …}`; `{"stopped": …}` after a stop, with what is
+known of each drive and after how many ms it confirmed. In go plain lines, each the answer to the next
+question; or `{"answer": …, "number": …}`, which answers that question alone and is passed over where it
+comes late or twice; or `{"stop": true}` at any time.
 
 `{"moving": …}` comes again and again while a joint is under power, and any line is a STOP then; `{"moving":
 null}` when that is over.

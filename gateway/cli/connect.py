@@ -17,14 +17,16 @@ from gateway.client import (
     LinkSettings,
     Robot,
     Unreachable,
+    WrongRobot,
 )
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
-from gateway.client.keys import named
+from gateway.client.keys import named, robot_names, server_file
 from gateway.plain_text import followed, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
 
+_WORD: Final = re.compile(r"[A-Za-z][\w-]*")  # a name, or a computer of this network
 _OBJECT: Final = re.compile(r"([\w-]+)\.0[xX]([0-9A-Fa-f]{4})(?::(\w+))?")
 USUAL: Final = Address()  # who is asked where nobody says whom
 
@@ -69,7 +71,14 @@ def add_robot(made: argparse.ArgumentParser) -> None:
 def again(arguments: argparse.Namespace, command: str) -> str:
     """Return how to give another command to the same robot."""
     robot: Address = arguments.robot
-    return f"gwrms {command}" if robot == USUAL else f"gwrms {command} --robot {robot}"
+    named_usual = robot == USUAL and not robot.called
+    return f"gwrms {command}" if named_usual else f"gwrms {command} --robot {robot.called or robot}"
+
+
+def spoken(arguments: argparse.Namespace) -> str:
+    """Return what the asked robot is called: its name, where it was asked for by that."""
+    robot: Address = arguments.robot
+    return robot.called or "the robot"
 
 
 def connect(arguments: argparse.Namespace, command: str) -> Robot:
@@ -93,9 +102,21 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
     try:
         return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
     except Unreachable as error:
+        if (unknown := _unknown_name(address)) and not isinstance(error, WrongRobot):
+            raise Unreachable(f"{unknown} If it is a computer: {error}") from error
         if address != USUAL:
             raise
         raise Unreachable(followed(str(error), "Another robot: --robot HOST:PORT")) from error
+
+
+def _unknown_name(address: Address) -> str:
+    """Return that no robot is called so, of a word alone that is no name in the server's file."""
+    word = address.host
+    if address.called or address.path or word == "localhost" or not _WORD.fullmatch(word):
+        return ""
+    known = robot_names()
+    listed = f" (it has {', '.join(known)})." if known else "."
+    return f"no robot is called {word!r} in {server_file()}{did_you_mean(word, known) or listed}"
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:

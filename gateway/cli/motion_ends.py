@@ -35,14 +35,14 @@ def _stop(ask: Callable[[], Stopped], benches: Iterable[CanBench], *, as_json: b
         signal.signal(number, signal.SIG_IGN)
     try:
         stopped = ask()
-    except DriverError as error:
+    except (DriverError, OSError) as error:
         stopped = Stopped({}, str(error))
     finally:
         for bench in benches:
             bench.close()
     if as_json:
         told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
-        say_json({"stopped": told})
+        say_json({"stopped": {**told, "states": stopped.states, "after_ms": stopped.after_ms}})
     else:
         say(stopped.words + "\n")
     return 0 if stopped.confirmed else 1

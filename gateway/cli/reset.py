@@ -87,6 +87,6 @@ def _text(reset: Reset) -> str:
 
 def _verdict(reset: Reset) -> int:
     if reset.problems:
-        what = "the stop is still held" if reset.held else "no stop is held, but"
-        warn("reset", f"{what}: {'; '.join(f'{name}: {why}' for name, why in reset.problems.items())}")
+        what = "the stop is still held" if reset.held else "no stop is held, but see"
+        warn("reset", f"{what}: {', '.join(reset.problems)}")
     return 1 if reset.held or reset.problems else 0

@@ -1,6 +1,6 @@
 """`gwrms stop`: quick stop on every drive."""
 
-from gateway.cli.connect import again, connect, parser
+from gateway.cli.connect import again, connect, parser, spoken
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import ClientError
 from gateway.wire.stop import Stopped
@@ -24,7 +24,7 @@ def main(argv: list[str]) -> int:
         with connect(arguments, "stop") as robot:
             stopped = robot.stop(arguments.reason)
     except ClientError as error:
-        warn("stop", f"NOT CONFIRMED, take it that the robot still moves. {error}")
+        warn("stop", f"NOT CONFIRMED, take it that {spoken(arguments)} still moves. {error}")
         return 1
     if arguments.json:
         say_json(stopped)
@@ -37,7 +37,8 @@ def _text(stopped: Stopped, reset: str) -> str:
     outcomes = {**stopped.drives, **stopped.controllers}
     rows = [(name, outcome, stopped.fallbacks.get(name, "")) for name, outcome in outcomes.items()]
     held = f"The stop is held until it is reset ({reset}).\n" if stopped.held else ""
-    return table(("DRIVE", "STOP", ""), rows) + f"\n{held}{WARNING}\n"
+    title = "DRIVE OR CONTROLLER" if stopped.controllers else "DRIVE"
+    return table((title, "STOP", ""), rows) + f"\n{held}{WARNING}\n"
 
 
 def _verdict(stopped: Stopped) -> int:

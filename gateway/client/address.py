@@ -14,11 +14,13 @@ class Address:
     """A robot's TCP address, or the path of its Unix socket as `host`.
 
     `pin` is the SHA-256 of the certificate that it must have; None: the one in the server's file, if any.
+    `called` is the robot's name in that file, by which it was asked for.
     """
 
     host: str = DEFAULT_HOST
     port: int = DEFAULT_PORT
     pin: str | None = field(default=None, compare=False)
+    called: str = field(default="", compare=False)
 
     @property
     def path(self) -> str | None:

@@ -59,10 +59,11 @@ def pin_of(address: Address) -> str | None:
         ) from error
     pin = next((pin for pin, where in robots if where == address), None)
     if pin is None and not is_here:
+        which = f"{address.called} ({address})" if address.called else str(address)
+        other = "" if address.called else f"use the address under which it stands in {server_file()}, or "
         raise NotPaired(
-            f"{address} is not paired, and to another computer nothing is said in plain: use the "
-            f"address under which it stands in {server_file()}, or pair it (gwrms keys pair there, then "
-            "gwrms pair here)"
+            f"{which} is not paired, and to another computer nothing is said in plain: {other}pair it (gwrms "
+            "keys pair there, then gwrms pair here)"
         )
     return pin
 
@@ -82,14 +83,23 @@ def named(name: str) -> Address | None:
         return None
     try:
         if isinstance(entry, str):
-            return Address.parse(entry)
+            return replace(Address.parse(entry), called=name)
         table: Mapping[str, Any] = entry if isinstance(entry, Mapping) else {}
         where, pin = Address.parse(str(table.get("address", ""))), table.get("pin")
+        where = replace(where, called=name)
         return where if pin is None else replace(where, pin=checked_pin(str(pin)))
     except ValueError as error:
         raise BadAddress(
             f"{name} stands in [robots] of {server_file()} and cannot be used: {error}"
         ) from error
+
+
+def robot_names() -> list[str]:
+    """Return the names of the robots in the server's file; none where it cannot be read."""
+    try:
+        return list(tomllib.loads(server_file().read_text(encoding="utf-8"))["robots"])
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return []
 
 
 def pins() -> set[str]:

@@ -3,9 +3,10 @@
 Like every stop it can enable nothing (`drivers.joint.commands`). It is software, not an emergency stop.
 """
 
+import time
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,7 @@ from gateway.commission.draft import Draft
 
 WITHIN_S = 1.5  # for a drive to confirm it
 MOST_AXES = 8  # of a node (CiA 402-2)
+NO_DRIVE = "the robot's file has no drive"
 OTHERS = "draft and robot's file do not tell of every drive: others may be on the bus"
 EVERY_NODE = range(1, 128)
 
@@ -37,11 +39,35 @@ class _File(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveStopped:
+    """What is known of one drive after a stop, and when it was: after the request was sent."""
+
+    outcome: StopOutcome
+    state: str | None = None  # in words, as it has said last; None: it has said nothing
+    after_ms: float | None = None  # until it was confirmed; None: it was not
+
+
+UNREACHED = DriveStopped(StopOutcome.UNREACHABLE)
+
+
+@dataclass(frozen=True, slots=True)
 class Stopped:
     """Result of a stop by drive; of no drives while none is known."""
 
     drives: Mapping[str, StopOutcome]
     problem: str = ""  # of the bus, or why there may be other drives
+    states: Mapping[str, str] = field(default_factory=dict)  # of drives that have said theirs
+    after_ms: Mapping[str, float] = field(default_factory=dict)  # of drives that have confirmed it
+
+    @classmethod
+    def of(cls, found: Mapping[str, DriveStopped], problem: str = "") -> "Stopped":
+        """Return the result from what is known of each drive."""
+        return cls(
+            {name: one.outcome for name, one in found.items()},
+            problem,
+            {name: one.state for name, one in found.items() if one.state is not None},
+            {name: one.after_ms for name, one in found.items() if one.after_ms is not None},
+        )
 
     @property
     def confirmed(self) -> bool:
@@ -80,17 +106,17 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     known = drafted | (written or set())
     found = _stopped(bench, known, every=draft.path.exists())
     is_open = (not drafted and draft.path.exists()) or written is None
-    return Stopped(
-        {str(axis): outcome for axis, outcome in found.items()}, OTHERS if is_open and known else ""
-    )
+    return Stopped.of({str(axis): one for axis, one in found.items()}, OTHERS if is_open and known else "")
 
 
 def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
     """Stop the drives of several buses, all at once: one that is dead keeps no other waiting.
 
-    Drives of a bus that does not open are not reached.
+    Drives of a bus that does not open, or fails meanwhile, are not reached.
     """
-    drives: dict[str, StopOutcome] = {}
+    if not buses:
+        return Stopped({}, NO_DRIVE)
+    drives: dict[str, DriveStopped] = {}
     problems: list[str] = []
     with ThreadPoolExecutor(len(buses), "stop") as pool:
         stopping = {name: pool.submit(_stopped, *of) for name, of in buses.items()}
@@ -99,19 +125,24 @@ def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
             found = future.result()
         except DriverError as error:
             problems.append(str(error))
-            found = dict.fromkeys(buses[name][1], StopOutcome.UNREACHABLE)
+            found = dict.fromkeys(buses[name][1], UNREACHED)
+        except OSError as error:  # of the interface, below the driver
+            problems.append(f"{name}: {error.strerror or error}")
+            found = dict.fromkeys(buses[name][1], UNREACHED)
         where = f" on {name}" if len(buses) > 1 else ""
-        drives |= {f"{axis}{where}": outcome for axis, outcome in found.items()}
-    return Stopped(drives, "; ".join(problems))
+        drives |= {f"{axis}{where}": one for axis, one in found.items()}
+    return Stopped.of(drives, "; ".join(problems))
 
 
-def _stopped(bench: CanBench, known: Collection[Axis], *, every: bool = False) -> dict[Axis, StopOutcome]:
+def _stopped(bench: CanBench, known: Collection[Axis], *, every: bool = False) -> dict[Axis, DriveStopped]:
+    sent_ns: dict[Axis, int] = {}
     asked = {*known, *(map(Axis, EVERY_NODE) if every or not known else ())}
     for axis in sorted(asked, key=lambda one: (one not in known, _place(one))):
+        sent_ns[axis] = time.monotonic_ns()
         bench.send_urgent(axis.node, _request(axis))
-    found = _confirmed(bench, known)
+    found = _confirmed(bench, known, sent_ns)
     further = [axis for axis in _further(bench, found) if axis not in found]
-    return found | _confirmed(bench, further)
+    return found | _confirmed(bench, further, sent_ns)
 
 
 def axes_of(draft: Draft) -> Iterator[Axis]:
@@ -139,8 +170,14 @@ def _request(axis: Axis) -> bytes:
     return expedited(axis.index(CONTROLWORD), 0, Controlword.QUICK_STOP.data)
 
 
-def _confirmed(bench: CanBench, axes: Iterable[Axis]) -> dict[Axis, StopOutcome]:
-    """Turn and turn about, so that one that is dead keeps no other waiting long."""
+def _confirmed(
+    bench: CanBench, axes: Iterable[Axis], sent_ns: Mapping[Axis, int]
+) -> dict[Axis, DriveStopped]:
+    """Turn and turn about, so that one that is dead keeps no other waiting long.
+
+    An axis that nobody knew of when the others were asked counts from now.
+    """
+    now_ns = time.monotonic_ns()
     left = {
         axis: (
             Stopping(Controlword.QUICK_STOP, STOPPED_STATES, WITHIN_S, asked=False),
@@ -148,12 +185,15 @@ def _confirmed(bench: CanBench, axes: Iterable[Axis]) -> dict[Axis, StopOutcome]
         )
         for axis in axes
     }
-    found: dict[Axis, StopOutcome] = {}
+    found: dict[Axis, DriveStopped] = {}
     while left:
         for axis, (stopping, where) in list(left.items()):
             outcome = stopping.turn(where)
             if outcome is not None:
-                found[axis] = outcome
+                after_ms = (time.monotonic_ns() - sent_ns.get(axis, now_ns)) / 1e6
+                is_confirmed = outcome is StopOutcome.CONFIRMED
+                state = None if stopping.state is None else stopping.state.words
+                found[axis] = DriveStopped(outcome, state, after_ms if is_confirmed else None)
                 del left[axis]
     return {axis: found[axis] for axis in sorted(found, key=_place)}
 
@@ -162,9 +202,9 @@ def _place(axis: Axis) -> tuple[int, int]:
     return axis.node, axis.number
 
 
-def _further(bench: CanBench, found: Mapping[Axis, StopOutcome]) -> Iterator[Axis]:
+def _further(bench: CanBench, found: Mapping[Axis, DriveStopped]) -> Iterator[Axis]:
     """Axes beyond the first one of nodes that answer."""
-    for node in {axis.node for axis, outcome in found.items() if outcome is not StopOutcome.UNREACHABLE}:
+    for node in {axis.node for axis, one in found.items() if one.outcome is not StopOutcome.UNREACHABLE}:
         for number in range(1, MOST_AXES):
             axis = Axis(node, number)
             try:

@@ -11,6 +11,7 @@ from server_gui.qt_needs import check, prefer_x
 EPILOG = """keys
   F12, Ctrl+Space   STOP the selected robot: quick stop on every drive. It is software over a
                     network, not a safety-rated emergency stop
+  Shift+F12         STOP ALL: the same for every robot of the list
   Ctrl+F            find a parameter
   Alt+O, S, R, C, L overview, signals, resources, recordings, cloud
   Alt+N             commission a robot

@@ -19,6 +19,7 @@ from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.robot_alarms import undriven
+from server_gui.core.alarms.texts import RESET_BUTTON
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -54,6 +55,7 @@ TILT_RAD = math.radians(15)
 SPARK_SPAN_RAD = math.radians(20)  # at least: a joint at rest is a flat line, not a magnified one
 PAST_ROWS = 240
 ROWS_A_BLOCK = 6
+RESET_KEY = "r r"  # pressed twice: in place of the window's button
 SAID_S = 10.0  # for so long what became of a reset is shown
 STOP_STYLES = {StopState.SENT: WARN, StopState.CONFIRMED: GOOD, StopState.NOT_CONFIRMED: BAD}
 NOT_WRITTEN = (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN)
@@ -358,7 +360,7 @@ def _alarm(active: Sequence[Active], controls: Controls) -> Text:
     alarm, more = active[0].alarm, len(active) - 1
     others = f"  (+{more} more)" if more else ""
     key = "  r r clears it" if alarm.clears and not controls.no_reset else ""
-    check = f"  → {alarm.check}" if alarm.check else ""
+    check = f"  → {alarm.check.replace(RESET_BUTTON, RESET_KEY)}" if alarm.check else ""
     style = COLOURS[alarm.mark.colour]
     return words(f"{GLYPHS[alarm.mark.shape]} {alarm.line}{others}{key}{check}", style=style)
 

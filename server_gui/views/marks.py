@@ -38,7 +38,6 @@ SHORTER: Final = {
     "switch on disabled": "disabled",
     "ready to switch on": "ready",
     "quick stop active": "quick stop",
-    "STOP NOT CONFIRMED": "NOT CONFIRMED",
     "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
 }
 

@@ -292,12 +292,14 @@ def test_a_fault_is_the_same_on_strip_card_header_and_events(around: Around, ben
     fault(bench)
     bench.draw(around)
     mark = bench.station.mark
-    assert (mark.shape, mark.colour, mark.word) == ("square", "bad", "fault")
+    assert (mark.shape, mark.colour, mark.word) == ("square", "bad", "left knee fault")
+    header = around.header._chips["robot"]
+    assert header.detail_text.startswith("left knee fault"), "its other drives are well"
     assert around.alarms.texts[0].startswith(f"fault: left knee: {CAUSE}\nsince ")
     assert "→ check that the joint moves freely" in around.alarms.texts[0]
     assert around.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
     assert CAUSE in around.alarms.headline.text()
-    assert around.events.pinned[0].mark == mark
+    assert around.events.pinned[0].mark == bench.station.alarms.active[0].alarm.mark
 
 
 def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_says_who_loses_torque(
@@ -437,7 +439,7 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.kind is Kind.RESET
     assert "enable the drives" in " ".join(around.alarms.texts)
-    assert bench.station.mark.word == "component stale", "its mark is that of the worst"
+    assert bench.station.mark.word == "left knee stale", "its mark is that of the worst"
     bench.look_again([looked(state="lost", problem="gone")])
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.mark.word == "lost"

@@ -257,6 +257,33 @@ def test_a_window_stays_where_a_drive_has_not_confirmed_that_it_is_stopped(
     assert not full_window.isVisible()
 
 
+def test_a_stop_is_proved_drive_by_drive_with_its_time_until_the_next_one(
+    page: CommissionPage, played: Played
+) -> None:
+    playing.stopping(played)
+    assert page.stopped.isHidden()
+    told = playing.stopped(confirmed=False)
+    told["stopped"] |= {
+        "drives": {"node 5": "confirmed", "node 6": "unconfirmed", "node 7": "unreachable"},
+        "states": {"node 5": "switch on disabled", "node 6": "operation enabled"},
+        "after_ms": {"node 5": 34.2},
+    }
+    played.hear(told)
+    draw(page)
+    assert page.stopped.texts == [
+        ("node 5", "switch on disabled", "34 ms"),
+        ("node 6", "operation enabled", "NOT CONFIRMED: unconfirmed"),
+        ("node 7", "not known", "NOT CONFIRMED: unreachable"),
+    ]
+    assert page.stopped.note == "1 of 3 confirmed"
+    played.model.stop()
+    draw(page)
+    assert page.stopped.isHidden(), "what was confirmed before is of before"
+    played.hear({"stopped": {"confirmed": True, "words": "…", "drives": {"node 5": "confirmed"}}})
+    draw(page)
+    assert page.stopped.texts == [("node 5", "not known", "confirmed")], "an older command tells no time"
+
+
 def test_a_window_that_is_ended_asks_nobody(full_window: MainWindow, played: Played) -> None:
     playing.hand(played)
     full_window.end()

@@ -61,6 +61,21 @@ def test_age_and_recording_are_in_sight_beside_stop_however_large_the_text_is(
     assert not rules.halved_numbers(header)
 
 
+def test_a_name_is_whole_as_long_as_others_can_say_less(bench: Bench, theme: Theme, header: Header) -> None:
+    """It was cut in its middle beside a chip that was wider than its words."""
+    bench.station.name, bench.station.is_named = "exo-rehab-center-left-01", True
+    header.resize(1366, header.height())
+    _told(bench, _walks)
+    header.refresh()
+    QApplication.processEvents()
+    robot = header._chips["robot"]
+    assert robot.width() >= robot.whole
+    header.resize(900, header.height())
+    header.refresh()
+    QApplication.processEvents()
+    assert not _overlaps(header), "what cannot be whole gives way as before"
+
+
 def test_a_recording_of_which_nothing_is_known_is_not_said_to_be_off(header: Header, bench: Bench) -> None:
     said = Said(Tone.OFF, "Recording: not known yet", brief="REC ?")
     for brief, text in ((False, said.text), (True, said.brief)):

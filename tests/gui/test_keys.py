@@ -23,7 +23,7 @@ from tests.gui.fakes import Bench, destroy, make_every_page, stop_is_whole
 from tests.support.desk import HELD, described, looked, walking
 
 TOLD_AS_ONE = {f"Ctrl+{place}" for place in range(2, 10)}  # with Ctrl+1
-NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
+NOT_THE_WINDOWS = {"F12", "Shift+F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
 
 
 def test_the_sheet_tells_every_key_of_the_window_and_comes_and_goes_with_one(window: MainWindow) -> None:

@@ -95,3 +95,21 @@ def test_a_narrow_card_of_a_stopped_robot_says_by_how_many_drives_and_how_soon(
     (card,) = around.robots.cards
     assert "confirmed by all 6 drives in 14 ms" in card._state._wordings[0]
     assert "STOPPED 6/6 in 14 ms" in card._state._wordings
+
+
+def test_a_long_name_is_whole_on_its_card_in_as_many_lines_as_it_needs(
+    window: MainWindow, bench: Bench
+) -> None:
+    name = "exo-rehab-center-right-02"
+    other = bench.add(name, 7421)
+    other.is_named = True
+    other.take([described(name)])
+    window.resize(1366, 768)
+    settle(window, bench)
+    label = window.robots.cards[1]._name
+    assert label.text().replace("\n", "") == name
+    assert "\n" in label.text()
+    assert label.accessibleName() == name
+    widest = max(label.fontMetrics().horizontalAdvance(line) for line in label.text().split("\n"))
+    assert widest <= label.width()
+    assert label.height() >= label.fontMetrics().lineSpacing() * len(label.text().split("\n"))

@@ -60,7 +60,7 @@ def _stopped(bench: Bench) -> None:
 
 def _unconfirmed(bench: Bench) -> None:
     live(bench, STRIDES)
-    bench.station.stop("STOP button of the window")
+    bench.desk.stop_all("STOP ALL of the window")
     bench.first.fail(NotConnected(LOST))
 
 

@@ -125,6 +125,47 @@ def test_stop_all_reaches_every_robot(window: MainWindow, bench: Bench) -> None:
     assert [len(commands.named("stop")) for commands in bench.commands] == [1, 1]
 
 
+@pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.5), (1366, 768, 1.0)])
+def test_the_result_of_stop_all_is_wholly_in_sight_beside_each_robots_own_until_all_are_reset(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02")])
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.desk.stop_all("all")
+    bench.first.answer(ALL)
+    bench.commands[1].fail(NotConnected("there is no link"))
+    bench.draw(window)
+    bar = window.stopped_all
+    assert bar.text.startswith("STOP ALL: 1 of 2 robots stopped")
+    assert "exo-02 STOP NOT CONFIRMED" in bar.text
+    assert bar.words.height() >= bar.words.heightForWidth(bar.words.width())
+    assert bar.visibleRegion().boundingRect() == bar.rect()
+    assert window.header.outcome_text == "STOP confirmed"
+    assert stop_is_whole(window)
+    for station, commands in zip(bench.desk.stations, bench.commands, strict=True):
+        station.reset()
+        commands.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    bench.draw(window)
+    assert bar.text == ""
+
+
+def test_shift_f12_stops_every_robot_and_f12_none_but_the_one_that_is_looked_at(
+    qt: QApplication, window: MainWindow, bench: Bench
+) -> None:
+    bench.add("exo-02", 7421)
+    keys = StopKeys(qt)
+    keys.pressed.connect(lambda: bench.station.stop("key"))
+    keys.all_pressed.connect(lambda: bench.desk.stop_all("key"))
+    window.activateWindow()
+    QTest.qWaitForWindowActive(window)
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_F12)
+    assert [len(commands.named("stop")) for commands in bench.commands] == [1, 0]
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_F12, Qt.KeyboardModifier.ShiftModifier)
+    assert [len(commands.named("stop")) for commands in bench.commands] == [2, 1]
+
+
 def test_stop_is_in_sight_on_every_tab_and_while_changes_are_reviewed(
     window: MainWindow, bench: Bench
 ) -> None:

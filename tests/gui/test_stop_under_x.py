@@ -115,6 +115,10 @@ def test_keys_and_click_stop_also_while_the_window_is_held_up(shown: Shown) -> N
     until(lambda: (shown.folder / "held").exists(), "held up")
     shown.xdotool("key", "F12")
     until(lambda: shown.stops == 4, "stopped while the window was held up")
+    shown.xdotool("key", "shift+F12")
+    until(lambda: shown.stops == 5, "stopped every robot likewise")
+    reasons = [call["reason"] for call in shown.robot.called("robot.stop")]
+    assert reasons[-2:] == ["STOP key of the window", "STOP ALL key of the window"]
     assert not (shown.folder / "free").exists(), "the window was not held up any more"
 
 

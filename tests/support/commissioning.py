@@ -126,7 +126,10 @@ def written(*findings: tuple[str, str], usable: bool = True, **more: Any) -> dic
 def stopped(*, confirmed: bool = True) -> dict[str, Any]:
     words = "STOP is confirmed by node 7" if confirmed else "NOT CONFIRMED: node 7 is unreachable"
     outcome = "confirmed" if confirmed else "unreachable"
-    return {"stopped": {"confirmed": confirmed, "words": words, "drives": {"node 7": outcome}}}
+    told: dict[str, Any] = {"confirmed": confirmed, "words": words, "drives": {"node 7": outcome}}
+    if confirmed:
+        told |= {"states": {"node 7": "switch on disabled"}, "after_ms": {"node 7": 34.2}}
+    return {"stopped": told}
 
 
 KNEE = asks(

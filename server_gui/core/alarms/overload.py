@@ -15,6 +15,7 @@ UNPLUGGED: Final = ("does not exist", "went away")  # as drivers say of a port
 ALSO: Final = "; also "  # begins what is to be checked besides
 PARTS: Final = frozenset({Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
 SILENT: Final = frozenset({Kind.NO_LINK, Kind.STALE}) | PARTS
+BUSES: Final = frozenset({Kind.BUS, Kind.BUS_FAILS})  # frames that a busy computer does not take are missing
 
 
 def overloaded(robot: Robot, *, is_ours: bool) -> tuple[str, ...]:
@@ -33,7 +34,9 @@ def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> I
     that are not: a load makes all of them late, so it is named after their own cable.
     """
     found = list(alarms)
-    late = [one for one in found if one.kind in SILENT and not any(word in one.what for word in UNPLUGGED)]
+    late = [
+        one for one in found if one.kind in SILENT | BUSES and not any(word in one.what for word in UNPLUGGED)
+    ]
     is_common = 2 * sum(one.kind in PARTS for one in late) >= parts
     for one in found:
         if not first or one not in late:

@@ -14,6 +14,8 @@ from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.overload import load_first, overloaded
+from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
+from server_gui.core.alarms.simulated import is_simulated, without_wires
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
@@ -70,7 +72,7 @@ class Facts:
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
-    return load_first(_found(facts), first, len(facts.robot.parts))
+    return load_first(without_wires(_found(facts), facts.robot), first, len(facts.robot.parts))
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
@@ -83,6 +85,7 @@ def _found(facts: Facts) -> Iterator[Alarm]:
     for part in robot.parts.values():
         if not part.comes_up:
             yield from _of_part(robot, part, facts.stopping)
+    yield from _of_silent(robot)
     yield from _of_those_that_come_up(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
@@ -114,15 +117,18 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=_after_stop(robot, stopping),
-            check=check_of(Kind.STOPPED, role=role_of(robot)),
+            check=go_on(Kind.STOPPED, robot),
             since_s=stopping.since_s,
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
-        yield Alarm(
-            Kind.RESET, "", what, check=check_of(Kind.RESET, role=role_of(robot)), since_s=stopping.since_s
-        )
+        yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
+
+
+def go_on(kind: Kind, robot: Robot) -> str:
+    """Return how to go on after a stop, as the robot's gateway may."""
+    return check_of(kind, role=role_of(robot), simulated=is_simulated(robot))
 
 
 def _then(why: str) -> str:
@@ -233,11 +239,11 @@ def _of_link(robot: Robot, address: str) -> Iterator[Alarm]:
 
 
 def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm]:
-    word, part = robot.word(f"{name}.state"), robot.parts[name]
-    if word not in _IN_FAULT and not (part.state == "fault" and "in fault" in (part.problem or "")):
+    part = robot.parts[name]
+    if not _is_in_fault(robot, part):
         return
     said, code = _cause(robot, part)
-    what, more = _advised(said)
+    what, more = _advised(said_of_missed(code, said))
     check = check_of(Kind.FAULT) if code is None else error_check(code)
     yield Alarm(
         Kind.FAULT,
@@ -250,6 +256,11 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
         clears=not robot.is_recording,
         is_now=not robot.is_stale(),
     )
+
+
+def _is_in_fault(robot: Robot, part: FollowedComponent) -> bool:
+    is_told = part.state == "fault" and "in fault" in (part.problem or "")
+    return is_told or robot.word(f"{part.name}.state") in _IN_FAULT
 
 
 def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
@@ -275,7 +286,7 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         found = _CODE.search(problem)
         if problem.startswith("it reports ") and found is not None:
             check = error_check(int(found[1], 16))
-            what = _PREFIX.sub("", problem)
+            what = said_of_missed(int(found[1], 16), _PREFIX.sub("", problem))
             yield Alarm(
                 Kind.REPORTS, part.name, what, where, check=check, channel=channel, clears=True, is_now=is_now
             )
@@ -288,6 +299,8 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
     what, advice = _advised(problem)
+    if problem.startswith("it reports ") and (found := _CODE.search(problem)) is not None:
+        what = said_of_missed(int(found[1], 16), what) if ";" not in what else what
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
     yield Alarm(
         kind,
@@ -301,6 +314,23 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         is_now=is_now,
         node=_bus(robot, part.name),
     )
+
+
+def _of_silent(robot: Robot) -> Iterator[Alarm]:
+    """Yield the nodes that others miss already, and of which nothing comes, before the robot has said so."""
+    if robot.is_recording:
+        return
+    reporters = {
+        part.name
+        for part in robot.parts.values()
+        if (part.kind == "joint" and _is_in_fault(robot, part) and _cause(robot, part)[1] in MISSED_CODES)
+        or ((found := _CODE.search(part.problem or "")) and int(found[1], 16) in MISSED_CODES)
+    }
+    for name in silent_nodes(robot, reporters, lambda name: _bus(robot, name)):
+        check = check_of(Kind.PART_STALE, robot.parts[name].kind)
+        yield Alarm(
+            Kind.PART_STALE, name, NO_VALUES, _where(robot, name), check=check, node=_bus(robot, name)
+        )
 
 
 def _advised(problem: str) -> tuple[str, str]:

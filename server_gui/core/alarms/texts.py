@@ -54,10 +54,10 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 
 
 _ENABLE: Final = "enable the drives (gwrms enable, or the robot's controller)"
-_START: Final = (  # where only the controller may: the gateway is an observer
-    "enable the drives: start the robot's controller again (simulated: Start walking, or gwrms sim-fault "
-    "--dir DIR --controller start)"
-)
+# Where only the controller may: the gateway is an observer.
+_START: Final = "enable the drives: start the robot's controller again"
+_START_SIMULATED: Final = f"{_START} (Start walking, or gwrms sim-fault --dir DIR --controller start)"
+RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
@@ -113,7 +113,7 @@ TEXTS: Final = dict(
             Kind.STOPPED,
             "triangle",
             "warn",
-            f"to go on: “Reset stop…” once nobody is in danger; then {_ENABLE}",
+            f"to go on: {RESET_BUTTON} once nobody is in danger; then {_ENABLE}",
         ),
         _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
         _text(
@@ -169,7 +169,10 @@ _CHECKS: Final = {
 }
 
 
-def check_of(kind: Kind, component: str = "", role: str | None = None) -> str:
-    """Return what to check, by the kind of component too, and by the gateway's role on the bus."""
+def check_of(kind: Kind, component: str = "", role: str | None = None, *, simulated: bool = False) -> str:
+    """Return what to check, by the kind of component too, and by the gateway's role on the bus.
+
+    What only a simulator can do is said only of a `simulated` robot.
+    """
     check = _CHECKS.get((kind, component), TEXTS[kind].check)
-    return check.replace(_ENABLE, _START) if role == "observer" else check
+    return check.replace(_ENABLE, _START_SIMULATED if simulated else _START) if role == "observer" else check

@@ -97,6 +97,7 @@ class Commissioning:
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
         self.written: WrittenMessage | None = None
         self.problem = ""  # in words, of whatever is wrong now
+        self.proof: StoppedMessage | None = None  # what the drives have said to the latest STOP
         self.log: deque[str] = deque(maxlen=MOST_LINES)
         self.logged = 0  # lines ever
         self.news: deque[str] = deque(maxlen=MOST_NEWS)  # said since the last answer
@@ -167,6 +168,7 @@ class Commissioning:
         self.wish = wish
         self.question, self.steps, self.proposed, self.written = None, (), None, None
         self.problem, self._error, self._stopped, self._stop_s, self._ending = "", "", None, None, False
+        self.proof = None
         self._live, self._powered = (), False
         self.news.clear()
         self._note(LogLineKind.NOTED, wish.typed)
@@ -192,6 +194,7 @@ class Commissioning:
         """STOP: the command ends what it does, and quick-stops every drive that is known. From any thread."""
         if self._stop_s is None or not self.runs:
             self._stop_s, self._stopped = self._clock(), None  # what was confirmed before is of before
+            self.proof = None
         talker = self._talker
         if talker is not None:
             talker.send(messages.STOP)
@@ -244,7 +247,7 @@ class Commissioning:
         elif line.written is not None:
             self.written = line.written
         elif line.stopped is not None:
-            self._stopped = line.stopped
+            self._stopped = self.proof = line.stopped
             self._stop_s = self._clock() if self._stop_s is None else self._stop_s  # by itself, too
             self._powered = self._powered and not line.stopped.confirmed
             self._note(LogLineKind.NOTED, line.stopped.words)
@@ -293,7 +296,7 @@ class Commissioning:
         if self._stop_s is None or self.wish is None:
             return
         if self._stopped is not None:
-            self.problem = "" if self._stopped.confirmed else self._stopped.words
+            self.problem = "" if self._stopped.confirmed else self._stopped.why
             self._end_stop(Stage.STOPPED if self._stopped.confirmed else Stage.NOT_CONFIRMED)
             return
         self.stage, self.question, self._live = Stage.STOPPING, None, ()

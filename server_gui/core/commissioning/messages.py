@@ -6,6 +6,9 @@ import msgspec
 
 from gateway.units import with_minus
 
+NOT_SAID: Final = "not known"
+CONFIRMED: Final = "confirmed"
+NOT_CONFIRMED: Final = "NOT CONFIRMED"
 ENTER: Final = " Then press Enter."
 
 
@@ -45,11 +48,39 @@ class WrittenMessage(msgspec.Struct, frozen=True):
 
 
 class StoppedMessage(msgspec.Struct, frozen=True):
-    """Result of a stop."""
+    """Result of a stop: outcome by drive, its state in words, and after how many ms it has confirmed.
+
+    States and times are of those that have told them; an older command tells none.
+    """
 
     confirmed: bool
     words: str
     drives: dict[str, str] = {}
+    states: dict[str, str] = {}
+    after_ms: dict[str, float] = {}
+
+    @property
+    def why(self) -> str:
+        """Why it is not confirmed, beside the words that it is not."""
+        return self.words.removeprefix(f"{NOT_CONFIRMED}: ")
+
+    def has_confirmed(self, drive: str) -> bool:
+        """Return whether this drive has."""
+        return self.drives.get(drive) == CONFIRMED
+
+    @property
+    def rows(self) -> tuple[tuple[str, str, str], ...]:
+        """A row a drive: its name, its state, and when it confirmed the STOP; else that it did not."""
+        return tuple(
+            (drive, self.states.get(drive, NOT_SAID), self._when(drive, said))
+            for drive, said in self.drives.items()
+        )
+
+    def _when(self, drive: str, said: str) -> str:
+        after_ms = self.after_ms.get(drive)
+        if said != CONFIRMED:
+            return f"{NOT_CONFIRMED}: {said}"
+        return "confirmed" if after_ms is None else f"{max(after_ms, 1.0):.0f} ms"
 
 
 class Error(msgspec.Struct, frozen=True):

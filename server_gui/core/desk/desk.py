@@ -1,6 +1,6 @@
 """All robots of the window, which one is looked at, and how things are shown."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gateway.units import Units
@@ -8,9 +8,11 @@ from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
+from server_gui.core.desk.stop_all import StopAll, StopAllResult
 from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.news import News
 from server_gui.core.prediction.adaptation import Happening
+from server_gui.core.tuning.stop import Sent
 
 
 @dataclass(slots=True)
@@ -33,6 +35,7 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
+        self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
@@ -88,5 +91,22 @@ class Desk:
 
     def stop_all(self, reason: str) -> None:
         """STOP to every robot, one after another without waiting."""
-        for station in self.stations:
-            station.stop(reason)
+        self.note_stop_all(self.send_stop_all(reason))
+
+    def send_stop_all(self, reason: str) -> list[tuple[Station, Sent]]:
+        """Send it from any thread, at once; the answers are for `note_stop_all`."""
+        return [(station, station.send_stop(reason)) for station in tuple(self.stations)]
+
+    def note_stop_all(self, stops: Sequence[tuple[Station, Sent]]) -> None:
+        """Follow what becomes of a STOP ALL that was sent."""
+        for station, sent in stops:
+            station.note_stop(sent)
+        self._stop_all = StopAll([station for station, _ in stops])
+
+    @property
+    def stopped_all(self) -> StopAllResult | None:
+        """What became of STOP ALL; None before one, and once every robot is reset."""
+        found = None if self._stop_all is None else self._stop_all.look(self.stations)
+        if found is None:
+            self._stop_all = None
+        return found

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 
 from gateway.client import CallTimeout, LinkLost
 from gateway.wire.stop import Reset
-from server_gui.core.alarms.texts import Kind, check_of
 
 
-def after_reset(reset: Reset, role: str | None = None) -> tuple[str, str]:
-    """Return what became of the stop; `role` is the gateway's on the bus.
+def after_reset(reset: Reset, next_step: str) -> tuple[str, str]:
+    """Return what became of the stop, and the next step where that is over.
 
     And of drives that have not left fault, with why and what to do, else "".
     """
@@ -22,7 +21,7 @@ def after_reset(reset: Reset, role: str | None = None) -> tuple[str, str]:
             filter(None, ["no stop is held, but not every fault is cleared", _told(others)])
         ), in_fault
     done = "; ".join(filter(None, ["stop reset, every drive is off", _told(others)]))
-    return f"{done}; {check_of(Kind.RESET, role=role)}", ""
+    return f"{done}; {next_step}", ""
 
 
 def without_answer(error: Exception) -> str:

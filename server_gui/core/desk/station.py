@@ -21,8 +21,9 @@ from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.robot_alarms import Facts, any_enabled, role_of
+from server_gui.core.alarms.robot_alarms import Facts, any_enabled, go_on
 from server_gui.core.alarms.robot_alarms import alarms as found
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flag_watch import FlagWatch
@@ -125,10 +126,6 @@ class Station:
         """Whether another robot of the desk calls itself so too."""
         others = (other for other in self.neighbours if other is not self)
         return any(self.called == (other.name if other.is_named else other.called) for other in others)
-
-    @property
-    def bus_role(self) -> str | None:
-        return role_of(self.robot)
 
     @property
     def title(self) -> str:
@@ -359,7 +356,7 @@ class Station:
                 self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
                 return
             self.stopping.was_reset(reset.held)
-            said, stays = after_reset(reset, self.bus_role)
+            said, stays = after_reset(reset, go_on(Kind.RESET, self.robot))
             self.tell(NewsKind.STOP, said)
             if stays:
                 self.tell(NewsKind.FAULT, stays)

@@ -283,12 +283,23 @@ class StopProgress:
 
         None of drives that were off when it was sent: they say nothing of how soon it acts.
         """
+        after_ms = self.slowest_ms
+        return f"{confirmed}, already off" if after_ms is None else f"{confirmed} in {after_ms:.0f} ms"
+
+    @property
+    def slowest_ms(self) -> float | None:
+        """Time of the slowest drive that has confirmed it; None where those were off when it was sent."""
         asked = [drive for drive in self._confirmed if drive not in self._off]
         if not asked:
-            return f"{confirmed}, already off"
+            return None
         after_ms = [proof.after_ms for drive in asked if (proof := self.proofs.get(drive)) is not None]
         is_shown = len(after_ms) == len(asked)
-        return f"{confirmed} in {max(1.0, *after_ms) if is_shown else self.answered_ms or 0:.0f} ms"
+        return max(1.0, *after_ms) if is_shown else self.answered_ms or 0.0
+
+    @property
+    def confirmed(self) -> frozenset[str]:
+        """The drives that have confirmed the latest STOP."""
+        return frozenset(self._confirmed)
 
     @property
     def news(self) -> str:
@@ -330,7 +341,7 @@ class StopProgress:
 
     def _not_confirmed(self, why: str) -> None:
         self.state, self.why = StopState.NOT_CONFIRMED, why
-        self.text = f"STOP NOT CONFIRMED: {why}. Use the hardware stop"
+        self.text = f"STOP NOT CONFIRMED: {why}{'' if why.endswith('?') else '.'} Use the hardware stop"
 
 
 def _said(entry: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.alarms.texts import Kind
-from server_gui.views.alarms.words import Key, Told, details, headline, key_of, now_s
+from server_gui.views.alarms.words import Key, Told, blames, details, headline, key_of, now_s
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
@@ -31,6 +31,7 @@ MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MORE: Final = "… more: rest the pointer here, or move it out of the list"
 LAYERS: Final = 4  # of layouts within layouts
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
+HINT_RESOURCES: Final = "What keeps the robot's computer busy, process by process"
 OVER: Final = Mark("ring", "dim", "over")
 
 
@@ -52,6 +53,10 @@ class Deeds(Protocol):
         """Bring what shows it, around the instant that it began."""
         ...
 
+    def show_resources(self, told: Told) -> None:
+        """Bring the page of what keeps its robot's computer busy."""
+        ...
+
     def acknowledge(self, told: Told) -> None:
         """Acknowledge the alarm."""
         ...
@@ -66,6 +71,7 @@ class AlarmRow(QFrame):
 
     cleared = Signal()
     signal = Signal()
+    resources = Signal()
     acknowledged = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -89,6 +95,7 @@ class AlarmRow(QFrame):
         self.acknowledge = self.buttons.acknowledge
         self.clear.clicked.connect(self.cleared)
         self.show_signal.clicked.connect(self.signal)
+        self.buttons.show_resources.clicked.connect(self.resources)
         self.acknowledge.clicked.connect(self.acknowledged)
         column = QVBoxLayout(self)
         column.setContentsMargins(9, 5, 8, 5)
@@ -170,12 +177,14 @@ class AlarmButtons(QWidget):
         self.clear = QPushButton("Clear fault…")
         self.clear.setToolTip("Reset the drives' fault: they go to switch on disabled, none is enabled")
         self.show_signal = QPushButton("Show the signal ± 5 s")
+        self.show_resources = QPushButton("Resources")
+        self.show_resources.setToolTip(HINT_RESOURCES)
         self.acknowledge = QPushButton("Acknowledge")
         self.acknowledge.setToolTip("Mark as read: other alarms come before it until it is over")
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._row.setContentsMargins(0, 0, 0, 0)
         self._row.setSpacing(6)
-        self._all = (self.clear, self.show_signal, self.acknowledge)
+        self._all = (self.clear, self.show_signal, self.show_resources, self.acknowledge)
         for button in self._all:
             self._row.addWidget(button)
 
@@ -193,6 +202,8 @@ class AlarmButtons(QWidget):
         self.clear.setEnabled(station is not None and station.is_linked)
         shows = one is not None and one.alarm.channel is not None and one.at_ns is not None
         self.show_signal.setVisible(all_of_them and shows)
+        is_of_load = alarm is not None and station is not None and blames(alarm)
+        self.show_resources.setVisible(all_of_them and is_of_load)
         unread = one is not None and not one.is_acknowledged and one.alarm.kind is not Kind.NOT_STOPPED
         is_past = station is not None and station.robot.is_recording  # nobody has to have read it
         self.acknowledge.setVisible(all_of_them and unread and not is_past)
@@ -270,6 +281,7 @@ class AlarmList(Overlay):
         row, place = AlarmRow(self._theme), len(self.rows)
         row.cleared.connect(lambda: self._strip.clear(self._at(place)))
         row.signal.connect(lambda: self._strip.show_signal(self._at(place)))
+        row.resources.connect(lambda: self._strip.show_resources(self._at(place)))
         row.acknowledged.connect(lambda: self._strip.acknowledge(self._at(place)))
         self.rows.append(row)
         self._column.insertWidget(place, row)

@@ -41,11 +41,13 @@ class AlarmStrip(ClickableFrame):
     """One line that is always there: the worst alarm, or that there is none. It never changes its height.
 
     `cleared` asks for a reset of a station's fault; `shown` brings a station, a channel and an instant on the
-    axis of its signals (ns). `list` is over `below` when it is asked for: everything there is, in full.
+    axis of its signals (ns), `resources` a station whose computer is to be looked at. `list` is over `below`
+    when it is asked for: everything there is, in full.
     """
 
     cleared = Signal(object)
     shown = Signal(object, str, object)
+    resources = Signal(object)
 
     def __init__(self, desk: Desk, theme: Theme, below: QWidget) -> None:
         super().__init__("alarm")
@@ -72,6 +74,7 @@ class AlarmStrip(ClickableFrame):
         self.more.clicked.connect(self.list.turn)
         self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
+        self.buttons.show_resources.clicked.connect(lambda: self.show_resources(self._first))
         self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
         again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
         self._words.resized.connect(self._say_again, again)
@@ -120,6 +123,12 @@ class AlarmStrip(ClickableFrame):
         if station is not None and one.alarm.channel is not None and one.at_ns is not None:
             self.list.hide()
             self.shown.emit(station, one.alarm.channel, one.at_ns)
+
+    def show_resources(self, told: Told) -> None:
+        """Bring the page of what keeps its robot's computer busy."""
+        if told[0] is not None:
+            self.list.hide()
+            self.resources.emit(told[0])
 
     def acknowledge(self, told: Told) -> None:
         """Acknowledge the alarm."""

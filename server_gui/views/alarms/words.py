@@ -20,6 +20,8 @@ BUSY: Final = "no alarms, but what is shown may be late: end other programs on t
 BREAK: Final = re.compile("[;,] ")  # between things to check
 SINCE: Final = "since "
 UNSEEN: Final = "as far as it is replayed: buses and computers are not"
+BLAME: Final = re.compile(r"gwrms blame(?:, gwrms snapshot resource)?")
+BLAME_PAGE: Final = "on the page Resources"
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -101,7 +103,17 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
-    return [*lines, f"{REMEDY} {alarm.check}"] if alarm.check else lines
+    return [*lines, f"{REMEDY} {in_window(alarm.check)}"] if alarm.check else lines
+
+
+def blames(alarm: Alarm) -> bool:
+    """Return whether the page of the computer's resources shows what is to be checked."""
+    return BLAME.search(alarm.check) is not None
+
+
+def in_window(check: str) -> str:
+    """Return what to check with this window's page for the command that shows the same in a terminal."""
+    return BLAME.sub(BLAME_PAGE, check)
 
 
 def fewer(said: list[str]) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from server_gui.views.commissioning.form import Form
 from server_gui.views.commissioning.question import Question
 from server_gui.views.commissioning.result import ResultCard
 from server_gui.views.commissioning.steps import Steps
+from server_gui.views.commissioning.stopped import StoppedCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.scroll_area import ScrollArea
@@ -44,6 +45,7 @@ class CommissionPage(QWidget):
         self.form = Form(commissioning.who)
         self.bar = Bar(commissioning, theme, self.form.start)
         self.question, self.steps = Question(commissioning, theme), Steps(theme)
+        self.stopped = StoppedCard()
         self.result, self.log = ResultCard(commissioning, theme), Log(commissioning, theme)
         self.bar.stopped.connect(commissioning.stop)
         self.bar.interrupted.connect(commissioning.interrupt)
@@ -51,7 +53,13 @@ class CommissionPage(QWidget):
         self.question.answered.connect(self._answer)
         self.result.connect_to.connect(self.connect_to)
         left = QVBoxLayout()
-        for widget, share in ((self.question, 0), (self.result, 2), (self.form, 0), (self.log, 1)):
+        for widget, share in (
+            (self.stopped, 0),
+            (self.question, 0),
+            (self.result, 2),
+            (self.form, 0),
+            (self.log, 1),
+        ):
             left.addWidget(widget, share)
         left.addStretch(0)  # while nothing was said
         self._columns = QBoxLayout(QBoxLayout.Direction.LeftToRight)
@@ -93,6 +101,7 @@ class CommissionPage(QWidget):
         self.question.setVisible(now.question is not None)
         self.question.refresh()
         self.steps.show_steps(now.steps, runs=now.runs)
+        self.stopped.show_proof(now.proof)
         self.result.refresh()
         self.log.setVisible(now.logged > 0)
         self.log.refresh()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.robot_alarms import remedy
+from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
@@ -24,7 +25,7 @@ from server_gui.views.widgets.stop_button import StopButton
 STOP_MARKS: Final = {
     StopState.SENT: Mark("half", "warn", "sent"),
     StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
-    StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
+    StopState.NOT_CONFIRMED: TEXTS[Kind.NOT_STOPPED].mark,
 }
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
@@ -160,13 +161,25 @@ class Header(QWidget):
                     brief.discard(name)
                 else:
                     needs[name] = least
-        usual = needs.get("robot", 0)
-        if usual:  # its name is cut only where that gives room to more
-            needs["robot"] = chips["robot"].whole
-            needs["robot"] = needs["robot"] if has_room() else usual
+        if "robot" in needs:
+            self._whole_name(needs, brief, room)
         for name in BRIEF:
             chips[name].be_brief(name in brief)
         return needs
+
+    def _whole_name(self, needs: dict[str, int], brief: set[str], room: int) -> None:
+        """Give the robot's name all that it needs, if others that say less make room; else what is left."""
+        around = len(needs) * self._row.spacing()
+        wider, briefer = {**needs, "robot": self._chips["robot"].whole}, set(brief)
+        for name in BRIEF:
+            if name in wider and sum(wider.values()) + around > room:
+                briefer.add(name)
+                wider[name] = self._chips[name].needs(brief=True)
+        if sum(wider.values()) + around <= room:
+            needs.update(wider)
+            brief |= briefer
+        else:
+            needs["robot"] += max(0, room - sum(needs.values()) - around)
 
     @property
     def _has_outcome(self) -> bool:

@@ -15,6 +15,7 @@ KEYS: Final[dict[str, dict[str, str]]] = {
     "Everywhere": {
         "F12": "STOP the selected robot",
         "Ctrl+Space": "STOP the selected robot",
+        "Shift+F12": "STOP ALL: every robot of the list",
         "Ctrl+1": "Select the first robot; up to Ctrl+9",
         "Alt+O": "Overview; Alt with the underlined letter opens each tab",
         "Ctrl+F": "Filter the parameters",

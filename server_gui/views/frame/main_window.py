@@ -53,6 +53,7 @@ from server_gui.views.predictions import activity
 from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
+from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.visibility import has_focus_in, is_seen
@@ -115,8 +116,10 @@ class MainWindow(QMainWindow):
         self.alarms = AlarmStrip(desk, theme, self._middle)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
+        self.alarms.resources.connect(self._show_resources)
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
+        self.stopped_all = StopAllBar(desk, theme)
         self.robots.added.connect(self.added)
         self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
@@ -186,6 +189,7 @@ class MainWindow(QMainWindow):
         self._pages.setCurrentIndex(1 if shown else 0)
         self.page_bar.setVisible(shown)
         self.header.refresh()
+        self.stopped_all.refresh()
         self.alarms.refresh()
         self._hold_header()
         self.robots.refresh()
@@ -206,7 +210,12 @@ class MainWindow(QMainWindow):
         station, page = self._desk.selected, self.tabs.currentIndex()
         if station is None:
             return self._pace.is_due((page, station))
-        about = (station.is_live, *station.stopping.stage, activity(station).mark.word)
+        about = (
+            station.is_live,
+            *station.stopping.stage,
+            activity(station).mark.word,
+            self._desk.stopped_all,
+        )
         return self._pace.is_due((page, station, *about))
 
     def show_signals(self, globs: Sequence[str]) -> None:
@@ -221,6 +230,11 @@ class MainWindow(QMainWindow):
         self.tabs.look_at(signals)
         signals.refresh()
         signals.show_around((channel,) if channel else (), at_ns)
+
+    def _show_resources(self, station: Station) -> None:
+        """Show what keeps a robot's computer busy."""
+        self._desk.select(station)
+        self.tabs.look_at(self.tabs.resources)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if self._commissioning is not None and self._commissioning.runs and not self._is_ending:
@@ -309,6 +323,7 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(above)
         top = _column(above)
         top.addWidget(self.header)
+        top.addWidget(self.stopped_all)
         top.addWidget(self.alarms)
         top.addWidget(self.page_bar)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea

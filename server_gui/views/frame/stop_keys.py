@@ -1,4 +1,4 @@
-"""F12 and Ctrl+Space, in whatever window or menu of ours the keyboard is."""
+"""F12 and Ctrl+Space, and Shift+F12 for all, in whatever window or menu of ours the keyboard is."""
 
 from typing import Final
 
@@ -11,15 +11,17 @@ KEYS: Final = frozenset(
         (Qt.Key.Key_Space, Qt.KeyboardModifier.ControlModifier),
     }
 )
+ALL: Final = (Qt.Key.Key_F12, Qt.KeyboardModifier.ShiftModifier)
 
 
 class StopKeys(QObject):
-    """`pressed` is emitted before any widget sees the key.
+    """`pressed`, or `all_pressed`, is emitted before any widget sees the key.
 
     Keys come to the window that has the focus first, also those for an open menu: it is enough to look there.
     """
 
     pressed = Signal()
+    all_pressed = Signal()
 
     def __init__(self, application: QGuiApplication) -> None:
         super().__init__(application)
@@ -29,10 +31,11 @@ class StopKeys(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if not isinstance(event, QKeyEvent) or event.type() != QEvent.Type.KeyPress:
             return super().eventFilter(watched, event)
-        if (Qt.Key(event.key()), event.modifiers()) not in KEYS:
+        key = Qt.Key(event.key()), event.modifiers()
+        if key not in KEYS and key != ALL:
             return super().eventFilter(watched, event)
         if not event.isAutoRepeat():
-            self.pressed.emit()
+            (self.all_pressed if key == ALL else self.pressed).emit()
         return True
 
     def _look_at(self, window: QWindow | None) -> None:

@@ -16,8 +16,8 @@ from typing import Final, Self
 from server_gui.core.threads.supervision import Worker
 
 F12, SPACE = 0xFFC9, 0x0020  # keysyms
-CONTROL, CAPS_LOCK, NUM_LOCK = 0x04, 0x02, 0x10
-KEYS: Final = ((F12, 0), (SPACE, CONTROL))
+SHIFT, CONTROL, CAPS_LOCK, NUM_LOCK = 0x01, 0x04, 0x02, 0x10
+KEYS: Final = ((F12, 0), (F12, SHIFT), (SPACE, CONTROL))  # with shift: of every robot
 LOCKS: Final = (0, CAPS_LOCK, NUM_LOCK, CAPS_LOCK | NUM_LOCK)
 GRAB_ASYNC: Final = 1
 KEY_PRESS: Final = 2
@@ -29,19 +29,32 @@ class NoX(Exception):
 
 
 class _Event(ctypes.Structure):
-    _fields_ = [("response_type", ctypes.c_uint8), ("keycode", ctypes.c_uint8)]
+    """`xcb_key_press_event_t`, up to the modifiers."""
+
+    _fields_ = [
+        ("response_type", ctypes.c_uint8),
+        ("keycode", ctypes.c_uint8),
+        ("sequence", ctypes.c_uint16),
+        ("time", ctypes.c_uint32),
+        ("windows", ctypes.c_uint32 * 3),
+        ("places", ctypes.c_int16 * 4),
+        ("modifiers", ctypes.c_uint16),
+    ]
 
 
 class X11Keys:
-    """Watches STOP keys of one window; `pressed` is called in its own thread. Use it as a context manager."""
+    """Watches STOP keys of one window; `pressed`, or `all_pressed`, is called in its own thread.
 
-    def __init__(self, window: int, pressed: Callable[[], None]) -> None:
+    Use it as a context manager.
+    """
+
+    def __init__(self, window: int, pressed: Callable[[], None], all_pressed: Callable[[], None]) -> None:
         self._window = window
-        self._pressed = pressed
+        self._called = {False: pressed, True: all_pressed}  # by whether shift is held
         self._xcb = _library("libxcb.so.1")
         self._connection = _connect(self._xcb)
         self._end = os.pipe()
-        self._last_s: dict[int, float] = {}  # of each key
+        self._last_s: dict[tuple[int, bool], float] = {}  # of each key, with and without shift
         self.worker = Worker("stop keys", self._watch, math.inf)  # it waits for a key, as long as it takes
 
     def __enter__(self) -> Self:
@@ -92,16 +105,17 @@ class X11Keys:
     def _take_events(self) -> None:
         while event := self._xcb.xcb_poll_for_event(self._connection):
             kind, code = event.contents.response_type & 0x7F, event.contents.keycode
+            of_all = bool(event.contents.modifiers & SHIFT)
             _free(event)
             if kind == KEY_PRESS:
-                self._press(code)
+                self._press(code, of_all=of_all)
 
-    def _press(self, code: int) -> None:
-        now_s = time.monotonic()
-        held = now_s - self._last_s.get(code, 0.0) < HELD_S
-        self._last_s[code] = now_s
+    def _press(self, code: int, *, of_all: bool) -> None:
+        now_s, key = time.monotonic(), (code, of_all)
+        held = now_s - self._last_s.get(key, 0.0) < HELD_S
+        self._last_s[key] = now_s
         if not held:
-            self._pressed()
+            self._called[of_all]()
 
 
 def _library(name: str) -> ctypes.CDLL:

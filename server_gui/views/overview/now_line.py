@@ -13,7 +13,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
-from server_gui.views.marks import SHORTER, Mark, drives_mark, enabled_text, time_of_day
+from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.mark import MarkIcon
@@ -204,7 +204,7 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
         led = TEXTS[Kind.NOT_STOPPED].mark
-        return led, (led.word, SHORTER[led.word]), (f"{known} · {count}", count)
+        return led, (led.word,), (f"{known} · {count}", count)
     if not station.is_live:
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
     mark = drives_mark(station.robot)

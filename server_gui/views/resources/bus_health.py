@@ -6,10 +6,12 @@ from typing import Final
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from gateway.wire.bus import BusInfo
+from server_gui.core.alarms.simulated import advised, is_simulated
 from server_gui.core.desk.bus_page import checks, lines
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import seen
+from server_gui.views.alarms.words import in_window
 from server_gui.views.resources.bus_card import BusCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
@@ -72,7 +74,9 @@ class BusHealthView(QWidget):
             text = "This robot has no CAN bus."
         else:
             text = "\n".join(line for _, line in found)
-        to_check = checks(buses or (), station.alarms)
+        simulated = is_simulated(station.robot)
+        found_checks = (advised(one, simulated=simulated) for one in checks(buses or (), station.alarms))
+        to_check = [*dict.fromkeys(map(in_window, found_checks))]
         set_text(self.checks, "\n".join(f"→ {check}" for check in to_check))
         self._check.setVisible(bool(to_check))
         tone = "bad" if any(bad for bad, _ in found) else ""

@@ -3,6 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -28,13 +29,20 @@ from server_gui.views.robots.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.clickable_frame import ClickableFrame
-from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
+HINT_ALL: Final = (
+    "Quick stop on every drive of every robot of the list (Shift+F12). It is software over a network, NOT a "
+    "safety-rated emergency stop: keep the hardware ones within reach."
+)
+SIGNS: Final = "_-.: "  # behind which a name goes on in another line
+LINES: Final = 3  # of a name
+LEAST_ROOM: Final = 40  # pixels: a label with less has no place yet
+MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -48,14 +56,12 @@ class RobotCard(ClickableFrame):
         self.station = station
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = (
-            ElidedLabel("title"),
-            ShrinkingLabel("dim"),
-            ShrinkingLabel("dim"),
-        )
+        self._name = PlainLabel()
+        self._name.setObjectName("title")
+        self._state, self._link = ShrinkingLabel("dim"), ShrinkingLabel("dim")
         self._doing = ShrinkingLabel("dim")
         self._where = ShrinkingLabel("dim")  # only where another robot is called so, too
-        for label in (self._where, self._state, self._doing, self._link):
+        for label in (self._name, self._where, self._state, self._doing, self._link):
             label.setMinimumWidth(1)  # else the card is wider than its list
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
@@ -70,7 +76,7 @@ class RobotCard(ClickableFrame):
         words.addWidget(self._name, 0, 1)
         words.addWidget(self.remove, 0, 2)
         for row, label in enumerate((self._where, self._state, self._doing, self._link), 1):
-            words.addWidget(label, row, 1, 1, 2)  # a state's own words have room
+            words.addWidget(label, row, 0, 1, 3)  # a state's own words have room
         column = QVBoxLayout(self)
         column.setContentsMargins(9, 7, 8, 7)
         column.setSpacing(5)
@@ -82,19 +88,30 @@ class RobotCard(ClickableFrame):
         """The shown texts: name, state, age, activity of the robot."""
         return self.station.title, self._state.text(), self._link.text(), self._doing.text()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fold()
+
+    def _fold(self) -> None:
+        name = self._name.accessibleName()
+        set_text(self._name, folded(name, self._name.fontMetrics(), self._name.width()))
+
     def refresh(self, *, selected: bool) -> None:
         """Show how it is now."""
         station, robot = self.station, self.station.robot
         mark = station.mark
         self._icon.show_mark(mark)
         has_twin = station.title != station.name and station.has_twin
-        set_text(self._name, station.called if has_twin else station.title)
+        name = station.called if has_twin else station.title
+        self._name.setAccessibleName(name)
+        self._fold()
         self._where.say(f"at {station.address}", station.address, f":{station.address.rpartition(':')[2]}")
         self._where.setVisible(has_twin)
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
-        said = () if worst is None else (worst.brief, f"{mark.word}: {worst.spoken}" if worst.spoken else "")
+        where = "" if worst is None or not worst.spoken or worst.spoken in mark.word else worst.spoken
+        said = () if worst is None else (worst.brief, f"{mark.word}: {where}" if where else "")
         short, stopping = SHORTER.get(mark.word, mark.word), station.stopping
         if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:
             said = (*said, stopping.timed(f"{mark.word} {stopping.drives}/{stopping.drives}"))
@@ -109,6 +126,18 @@ class RobotCard(ClickableFrame):
         if self.property("selected") != selected:
             self.setProperty("selected", selected)
             self.style().polish(self)
+
+
+def folded(name: str, metrics: QFontMetrics, room: int) -> str:
+    """Return a name in as many lines as it needs, up to `LINES`; the last is cut in its middle at most."""
+    lines, rest = list[str](), name
+    while room >= LEAST_ROOM and metrics.horizontalAdvance(rest) >= room and len(lines) < LINES - 1:
+        places = [at for at, sign in enumerate(rest, 1) if sign in SIGNS and at < len(rest)]
+        fits = (at for at in reversed(places) if metrics.horizontalAdvance(rest[:at]) < room)
+        letters = (at for at in range(len(rest) - 1, 0, -1) if metrics.horizontalAdvance(rest[:at]) < room)
+        cut = next(fits, 0) or next(letters, len(rest))
+        lines, rest = [*lines, rest[:cut]], rest[cut:]
+    return "\n".join((*lines, metrics.elidedText(rest, MIDDLE, room) if lines else rest))
 
 
 class RobotsPanel(QWidget):
@@ -159,6 +188,8 @@ class RobotsPanel(QWidget):
         self.all_stop = StopButton()
         self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
+        self.all_stop.setToolTip(HINT_ALL)
+        self.all_stop.setAccessibleDescription(HINT_ALL)
         self.all_stop.stopped.connect(self.stop_all)
         self.all_stop.setEnabled(False)  # there is no robot yet
         everything = QVBoxLayout(self)

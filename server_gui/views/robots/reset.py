@@ -6,7 +6,8 @@ from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.marks import ENABLED
-from server_gui.core.alarms.texts import Kind, check_of
+from server_gui.core.alarms.robot_alarms import go_on
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.station import Station
 from server_gui.views.confirmation import Question, ask
 
@@ -17,7 +18,7 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     """Ask whether a held stop is to be ended."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
-    text = f"{held}\n\n{DOES}\n\nAfterwards, {check_of(Kind.RESET, role=station.bus_role)}."
+    text = f"{held}\n\n{DOES}\n\nAfterwards, {go_on(Kind.RESET, station.robot)}."
     return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
 
 
@@ -25,7 +26,7 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
     """Ask whether faults are to be cleared: what is enabled loses its torque by it."""
     more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
-    check = check_of(Kind.RESET, role=station.bus_role)
+    check = go_on(Kind.RESET, station.robot)
     asked = "\n".join((f"Clear the fault of {station.title}?", *_faults(station)))
     text = f"{asked}\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"

@@ -183,7 +183,12 @@ def test_a_stop_that_stays_held_is_no_success(
             "held": held,
         }
         assert run(robot, "reset") == 1
-    assert "STILL HELD" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "STILL HELD" in said.out
+    for name, why in problems.items():
+        assert why in said.out
+        assert why not in said.err, "each reason is said once"
+        assert f"the stop is still held: {name}" in said.err
 
 
 def test_a_drive_that_is_enabled_is_told_with_its_mode(capsys: pytest.CaptureFixture[str]) -> None:

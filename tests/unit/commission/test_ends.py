@@ -1,5 +1,6 @@
 """However the command is ended, it says so, keeps what was found, and lets the file go."""
 
+import errno
 import json
 import os
 import signal
@@ -14,9 +15,10 @@ import pytest
 from drivers.bus.settings import CanSettings
 from gateway.cli import commission_lines, joint_test
 from gateway.cli.motion_ends import ENDS
+from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
 from gateway.commission.draft import Draft
-from gateway.commission.stopping import stop
+from gateway.commission.stopping import stop, stop_all
 from gateway.main import main
 from tests.support.waiting import until
 from tests.unit.commission.homing_drive import HomingDrive
@@ -85,7 +87,11 @@ def test_a_stop_asks_the_drives_that_were_found_and_those_of_the_file_before(
     on = S.OPERATION_ENABLED
     with HomingDrive(channel, 5, state=on) as found, HomingDrive(channel, 6, state=on) as kept:
         try:
-            assert stop(bench, draft).drives == {"node 5": "confirmed", "node 6": "confirmed"}
+            stopped = stop(bench, draft)
+            assert stopped.drives == {"node 5": "confirmed", "node 6": "confirmed"}
+            assert stopped.states == dict.fromkeys(stopped.drives, "switch on disabled")
+            assert all(0.0 < after_ms < 5000.0 for after_ms in stopped.after_ms.values())
+            assert set(stopped.after_ms) == set(stopped.drives)
         finally:
             bench.close()
         assert (found.state, kept.state) == (S.SWITCH_ON_DISABLED, S.SWITCH_ON_DISABLED)
@@ -152,6 +158,40 @@ def test_a_stop_reaches_the_drives_of_every_bus_and_one_that_has_the_same_number
     with drives[1]:
         assert main(["joint-test", "stop", f"{file}:right_knee"]) == 1
     assert "NOT CONFIRMED: node 5 on one is unreachable" in capsys.readouterr().out
+    with drives[1]:
+        assert main(["joint-test", "stop", f"{file}:right_knee", "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)["stopped"]
+    assert told["drives"] == {"node 5 on one": "unreachable", "node 5 on two": "confirmed"}
+    assert told["states"] == {"node 5 on two": "switch on disabled"}
+    assert list(told["after_ms"]) == ["node 5 on two"], "no time where nothing was confirmed"
+
+
+def test_an_interface_that_fails_hides_nothing_of_the_drives_of_another_bus(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its error was all that was said: that the other bus's drives had confirmed was lost."""
+    channel = request.node.nodeid
+    good, bad = (CanBench(name, CanSettings(interface="virtual", channel=channel)) for name in ("one", "two"))
+
+    def fail(_node: int, _data: bytes) -> None:
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+    monkeypatch.setattr(bad, "send_urgent", fail)
+    with HomingDrive(channel, 5, state=S.OPERATION_ENABLED) as drive:
+        try:
+            stopped = stop_all({"one": (good, {Axis(5)}), "two": (bad, {Axis(6)})})
+        finally:
+            good.close()
+            bad.close()
+    assert drive.state == S.SWITCH_ON_DISABLED
+    assert stopped.drives == {"node 5 on one": "confirmed", "node 6 on two": "unreachable"}
+    assert not stopped.confirmed
+    assert stopped.words == "NOT CONFIRMED: node 6 on two is unreachable (two: Network is down)"
+
+
+def test_a_stop_of_no_drive_at_all_is_not_confirmed_and_raises_nothing() -> None:
+    stopped = stop_all({})
+    assert (stopped.confirmed, stopped.words) == (False, "NOT CONFIRMED: the robot's file has no drive")
 
 
 def test_a_stop_by_a_line_before_a_joint_is_tested_stops_every_drive(

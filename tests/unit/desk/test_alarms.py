@@ -16,7 +16,7 @@ from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.marks import STATES
+from server_gui.core.alarms.marks import STATES, Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk import station as station_module
 from server_gui.core.desk.desk import Desk
@@ -77,7 +77,16 @@ def test_a_fault_says_its_cause_first_where_it_is_what_was_done_and_what_to_chec
     assert one.alarm.check == error_check(0x2310)
     assert one.alarm.did == "no drive is enabled: 5 quick stop active, 1 fault"
     assert (one.alarm.channel, one.alarm.clears) == ("left_knee.current", True)
-    assert bench.station.mark == one.alarm.mark == TEXTS[Kind.FAULT].mark
+    assert one.alarm.mark == TEXTS[Kind.FAULT].mark
+    assert bench.station.mark == Mark("square", "bad", "left knee fault")
+
+
+def test_a_robot_of_which_one_part_is_lost_says_which_in_its_word(bench: Bench) -> None:
+    """It said "lost" beside green drives: nobody knew whether that was the robot."""
+    lost: QualityInfo = {"state": "lost", "age_ms": 4000.0, "problem": "nothing came for 4 s"}
+    whole = looked()
+    bench.station.take([Looked(Snapshot(0, {}, {}, {"left_insole": lost}), whole.parameters, whole.at_ns)])
+    assert bench.station.mark == Mark("cross", "bad", "left insole lost")
 
 
 def test_what_the_robot_advises_is_said_once_in_place_of_what_is_usual(bench: Bench) -> None:
@@ -142,7 +151,7 @@ def test_what_is_acknowledged_is_no_better_for_it(bench: Bench) -> None:
     fault(bench.station)
     bench.station.alarms.acknowledge((Kind.FAULT, "left_knee"))
     assert bench.station.alarms.active[0].is_acknowledged
-    assert bench.station.mark.word == "fault"
+    assert bench.station.mark.word == "left knee fault"
 
 
 def _link_lost(bench: Bench) -> None:

@@ -1,15 +1,19 @@
 """Alarms with one cause are one alarm: a computer that stood still, a node that has gone."""
 
+import time
+
 import pytest
+from msgspec.structs import replace
 
 from gateway.client import Batch, ClockOffset
+from gateway.wire.component import QualityInfo, Snapshot
 from server_gui.core.alarms.alarm import Active, Alarm
 from server_gui.core.alarms.causes import AFTER_S, OWN_S, TOLD_S, Stall, Stalls, gathered, stood_still
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
-from server_gui.core.follow.events import Telemetry
+from server_gui.core.follow.events import Described, Looked, Telemetry
 from server_gui.core.follow.news import NewsKind
-from tests.support.desk import JOINTS, Bench, described, looked, walking
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
 SECOND_NS = 1_000_000_000
 STALL = Stall(100.0, 1.2)
@@ -153,3 +157,62 @@ def test_stalls_that_follow_each_other_are_one_event_until_one_is_far_longer() -
         assert found is not None
         told += [lasted_s] if stalls.is_news(found) else []
     assert told == [0.6, 2.0]
+
+
+@pytest.fixture
+def nodes(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A robot of which two knees are nodes of one bus, and a hip is one of another."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    made, known = Bench(Desk()), described().description
+    devices = {
+        "left_knee": {"node_id": 2, "bus": "main"},
+        "right_knee": {"node_id": 5, "bus": "main"},
+        "right_hip": {"node_id": 4, "bus": "other"},
+    }
+    parts = [replace(one, device=devices.get(one.name, {})) for one in known.components]
+    made.add("exo-01").take([Described(replace(known, components=parts)), walking(50), looked()])
+    return made
+
+
+def misses(bench: Bench, *silent: str) -> None:
+    """The right knee reports a heartbeat that has not come; no value comes of these."""
+    at_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {
+        f"{joint}.{quantity}": [None]
+        for joint in silent
+        for quantity in ("position", "velocity", "torque", "current", "temperature", "state")
+    }
+    fault: QualityInfo = {"state": "fault", "age_ms": 1.0, "problem": f"the drive is in fault: {MISSED}"}
+    whole = looked()
+    snapshot = Snapshot(0, {}, {}, {"right_knee": fault})
+    bench.look_again([telemetry([at_ns], columns, at_ns), Looked(snapshot, whole.parameters, whole.at_ns)])
+
+
+MISSED = "0x8130 life guard or heartbeat error"
+
+
+def test_a_node_that_is_silent_leads_from_the_frame_in_which_another_one_misses_it(nodes: Bench) -> None:
+    """For a second the alarm led with what the other one reports: the robot calls the silent one ok still."""
+    misses(nodes, "left_knee", "right_hip")
+    station = nodes.station
+    (one,) = station.alarms.active
+    assert (one.alarm.kind, one.alarm.subject) == (Kind.PART_STALE, "left_knee")
+    assert one.alarm.line == "component silent: left knee, node 2 on main: nothing comes from it"
+    assert [under.subject for under in one.alarm.under] == ["right_knee"]
+    assert one.alarm.mark.colour == "bad"
+    assert station.mark.word == "left knee silent"
+    assert one.alarm.clears, "the fault of the other one has to be cleared"
+
+
+def test_where_the_silent_node_is_not_known_the_alarm_says_what_it_means(nodes: Bench) -> None:
+    misses(nodes)
+    (one,) = nodes.station.alarms.active
+    assert one.alarm.line == (
+        f"fault: right knee, node 5 on main: a node that it listens to is silent ({MISSED})"
+    )
+
+
+def test_a_node_without_values_is_silent_only_where_another_one_misses_it(nodes: Bench) -> None:
+    at_ns = time.monotonic_ns()
+    nodes.look_again([telemetry([at_ns], {"left_knee.position": [None]}, at_ns)])
+    assert nodes.station.alarms.active == ()

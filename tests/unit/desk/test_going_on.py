@@ -1,23 +1,69 @@
 """How to go on after a stop, as the robot's gateway may: an observer enables nothing."""
 
 import pytest
+from msgspec.structs import replace
 
 from gateway.wire.stop import Reset
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.overload import THEIRS, load_first
+from server_gui.core.alarms.robot_alarms import go_on
+from server_gui.core.alarms.simulated import NO_WIRES, advised, without_wires
 from server_gui.core.alarms.texts import Kind, check_of
+from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.resetting import after_reset
+from server_gui.core.follow.events import Described
+from server_gui.core.follow.robot import Robot
+from tests.support.desk import Bench, described
+
+BUS = "check termination, wiring and bitrate"
 
 
 @pytest.mark.parametrize("kind", [Kind.RESET, Kind.STOPPED])
 def test_an_observer_s_user_is_told_to_start_the_controller(kind: Kind) -> None:
     said = check_of(kind, role="observer")
     assert "start the robot's controller again" in said
-    assert "Start walking" in said
-    assert "gwrms sim-fault --dir DIR --controller start" in said
     assert "gwrms enable" not in said
     assert "gwrms enable" in check_of(kind, role="master")
 
 
+@pytest.mark.parametrize("kind", [Kind.RESET, Kind.STOPPED])
+def test_the_simulator_is_spoken_of_only_where_the_robot_is_one(kind: Kind) -> None:
+    said = check_of(kind, role="observer", simulated=True)
+    assert "Start walking, or gwrms sim-fault --dir DIR --controller start" in said
+    assert "sim-fault" not in check_of(kind, role="observer")
+    bench = Bench(Desk())
+    station = bench.add("exo-01")
+    known = described().description
+    for vendor, simulated in (("maxon motor ag", False), ("GWRMS", True)):
+        parts = [replace(one, device={"node_id": 2, "vendor": vendor}) for one in known.components]
+        station.take([Described(replace(known, components=parts))])
+        assert ("sim-fault" in go_on(kind, station.robot)) is simulated
+
+
+def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
+    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check=BUS)
+    for vendor, check in (("maxon motor ag", alarm.check), ("GWRMS", NO_WIRES)):
+        robot, known = Robot(), described().description
+        parts = [replace(one, device={"vendor": vendor}) for one in known.components]
+        robot.apply(Described(replace(known, components=parts)))
+        (one,) = without_wires([alarm], robot)
+        assert one.check == check
+
+
+def test_of_a_simulated_robot_only_the_wiring_is_left_out_of_what_to_check() -> None:
+    said = f"see that the gateway runs; {BUS}; see the manual"
+    assert advised(said, simulated=False) == said
+    assert advised(said, simulated=True) == f"see that the gateway runs; {NO_WIRES}; see the manual"
+
+
+def test_of_a_bus_an_overloaded_computer_is_checked_before_the_wiring() -> None:
+    alarm = Alarm(Kind.BUS, "bus.main", "many errors", check=BUS)
+    (one,) = load_first([alarm], (THEIRS,), 10)
+    assert one.check == f"{THEIRS}; then {alarm.check}"
+
+
 def test_the_answer_to_a_reset_says_so_too() -> None:
     reset = Reset({"left_knee": "switch on disabled"}, {}, held=False)
-    assert "controller again" in after_reset(reset, "observer")[0]
-    assert "gwrms enable" in after_reset(reset, "master")[0]
+    said, stays = after_reset(reset, check_of(Kind.RESET, role="observer"))
+    assert "controller again" in said
+    assert not stays

@@ -24,7 +24,7 @@ from server_gui.core.processing.gait_measures import Gait, LegGait
 from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
 from server_gui.terminal.keys import Key, KeyParser
-from tests.support.desk import FakeCommands, resources
+from tests.support.desk import FakeCommands, looked, resources, walking
 from tests.support.terminal_robot import a_station, parameter, screen
 
 
@@ -142,6 +142,15 @@ def test_what_a_reset_does_is_said_by_whether_a_stop_is_held() -> None:
     asked.answer(Stopped({"left_knee": "confirmed"}, True))
     controls.press(Key.RESET)
     assert "r again ends the held stop" in screen(station, controls)
+
+
+def test_how_to_go_on_after_a_stop_names_the_key_and_not_a_button_of_the_window() -> None:
+    station = a_station(FakeCommands())
+    station.take([walking(10), looked()])
+    station.stopping.described(True, "test")
+    said = screen(station, Controls(station))
+    assert "to go on: r r once nobody is in danger" in " ".join(said.split())
+    assert "Reset stop" not in said
 
 
 def test_a_reset_needs_the_key_twice_within_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
