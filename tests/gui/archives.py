@@ -206,6 +206,7 @@ def cell(shown: Shown, column: int) -> str:
 
 def play(shown: Shown, archive: Archive) -> None:
     """Open the newest recording, which plays at once, and stand still at its beginning."""
+    archive.library.look(now=True)
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount(), "listed it")

@@ -198,6 +198,29 @@ def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
     assert table.columnWidth(0) >= table.fontMetrics().horizontalAdvance(name)
 
 
+@pytest.mark.parametrize("width", [480, 660, 1400])
+def test_every_figure_is_there_at_every_width_and_none_is_cut(signals: Signals, width: int) -> None:
+    signals.resize(width, 700)
+    signals.cursors.click()
+    title(signals)
+    QApplication.processEvents()
+    title(signals)
+    view = signals.measuring
+    tables = [one for one in (view.table, view.below) if not one.isHidden()]
+    shown = {
+        TITLES[column]
+        for table in tables
+        for column in range(len(TITLES))
+        if not table.isColumnHidden(column)
+    }
+    assert shown == {*TITLES}
+    for table in tables:
+        for column in range(1, len(TITLES)):
+            if not table.isColumnHidden(column):
+                assert table.columnWidth(column) >= table.sizeHintForColumn(column)
+    assert view.below.isHidden() is (width == 1400)
+
+
 def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signals) -> None:
     signals.cursors.click()
     signals._move(0, -5.0)

@@ -1,17 +1,21 @@
 """A recording with a fault in it: the alarm of that time is shown again, and leads to its signal."""
 
 import pytest
-from PySide6.QtCore import Qt
+from msgspec.structs import replace
+from PySide6.QtCore import QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu
 
 from server_gui.core.archive.archive import Archive
-from server_gui.core.desk.flags import FlagKind
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.widgets.cursors import FIRST, FLAGS
-from tests.gui.archives import Shown, play, record
+from tests.gui.archives import ADA, Shown, play, record
+from tests.gui.fakes import Bench
+from tests.support.desk import described, looked
 
 FAULT_S = 5.0
 
@@ -21,6 +25,86 @@ def player(shown: Shown, archive: Archive, settings: ServerSettings) -> Player:
     record(settings, fault_s=FAULT_S)
     play(shown, archive)
     return shown.window.tabs.recordings.player
+
+
+def at(seconds: float, tape: Tape) -> int:
+    return tape.first_ns + round(seconds * 1e9)
+
+
+def test_flags_outside_of_it_are_not_at_the_ends_of_its_bar_and_the_list_says_so(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    tape = archive.playback.tape
+    assert tape is not None
+    before, early, after = (
+        Flag(at(seconds, tape), text, FlagKind.MARK)
+        for seconds, text in ((-3.0, "before"), (2.0, "early"), (99.0, "after"))
+    )
+    archive.playback.happened.flags.add(before, early, after)
+    player._refresh_words()
+    timeline = player.timeline
+    bar = timeline._bar()
+    places = [QPointF(x, bar.top() - 4) for x in (bar.left(), timeline._x(early.at_ns), bar.right())]
+    assert [timeline._flag_at(place) for place in places] == [None, early, None]
+    menu = QMenu()
+    player._list_events(menu)
+    said = [action.text() for action in menu.actions()]
+    assert any(text.endswith("mark: before, before its beginning") for text in said)
+    assert any(text.endswith("mark: after, after its end") for text in said)
+    archive.playback.seek(at(8.0, tape))
+    player._turn(1)
+    assert archive.playback.position_ns == at(8.0, tape), "there is no event to go to in it"
+
+
+def test_once_a_drive_has_failed_its_row_is_seen_on_a_low_screen(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    shown.window.resize(660, 590)  # what a screen of 768 leaves beside the panels
+    player.labelling.setChecked(False)
+    to_the_fault(shown, archive, player)
+    shown.draw()
+    table = player.overview._table
+    row = next(
+        row
+        for row in range(table.model().rowCount())
+        if "left knee" in str(table.model().index(row, 0).data())
+    )
+    place = table.visualRect(table.model().index(row, 0))
+    place.moveTopLeft(table.viewport().mapTo(table, place.topLeft()))
+    assert table.visibleRegion().contains(place), "it has to be scrolled to"
+
+
+def test_the_limits_of_a_replay_are_those_of_the_recording_and_never_of_the_live_robot(
+    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
+) -> None:
+    knee = "left_knee.max_torque"
+    bench.station.take([described(), looked({knee: 80.0})])
+    setup: dict[str, str | float] = {f"object/{knee}": "0x6072:0 N·m"}
+    record(settings, facts=replace(ADA, parameters={knee: 30.0}, setup=setup))
+    play(shown, archive)
+    player = shown.window.tabs.recordings.player
+    tape, torque = archive.playback.tape, player.overview._plots[1]
+    assert tape is not None
+
+    def limits_at(seconds: float) -> list[float]:
+        archive.playback.seek(at(seconds, tape))
+        shown.until(lambda: not archive.playback.is_loading, "went there")
+        player.overview.read_now()
+        shown.draw()
+        return list(torque.plot._limits)
+
+    assert limits_at(2.0) == [30.0, -30.0]
+    assert "start ±30" in torque.legend.accessibleDescription(), "no journal is known"
+    asked: dict[str, object] = {"what": "write", "write": 1, "before": {knee: 30.0}, "after": {knee: 40.0}}
+    journal = [
+        {**asked, "utc_ns": at(5.0, tape)},
+        {"what": "write done", "write": 1, "after": {knee: 40.0}, "utc_ns": at(5.1, tape)},
+    ]
+    archive.playback.parameters.tell(journal, tape.first_ns, tape.last_ns)
+    assert limits_at(4.0) == [30.0, -30.0]
+    assert "±30" in torque.legend.accessibleDescription()
+    assert "start" not in torque.legend.accessibleDescription()
+    assert limits_at(6.0) == [40.0, -40.0]
 
 
 def to_the_fault(shown: Shown, archive: Archive, player: Player) -> None:

@@ -4,11 +4,15 @@ import threading
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QMenu
+from msgspec.structs import replace
+from PySide6.QtWidgets import QApplication, QMenu
 
+from gateway.units import Units, rounded
 from server_gui.core.archive.archive import Archive
+from server_gui.core.archive.cycle_remarks import CycleRemarks
 from server_gui.core.archive.side_by_side import By
 from server_gui.core.cloud.tape import Tape
+from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
@@ -21,6 +25,7 @@ def player(shown: Shown, archive: Archive, settings: ServerSettings) -> Player:
     """Both are marked and shown side by side, and stand still."""
     for _ in range(2):
         record(settings)
+    archive.library.look(now=True)
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
@@ -64,9 +69,8 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one
     assert np.count_nonzero(~np.isnan(beside)) > len(times) / 2
     assert first.session.session != second.session.session
     assert player.beside_bar.isVisible()
-    assert player.beside_bar.said.text().endswith("aligned by")
     assert player.beside_bar.by.currentText() == "their beginnings"
-    assert scene.beside_text().endswith("played together"), "aligned as is chosen above, and in no second way"
+    assert scene.beside_text() == "", "aligned as is chosen above, and in no second way"
     assert rules.out_of_reach(player) == []
     assert player.signals.cards[0].visibleRegion().boundingRect().height() > 0, "curves are in sight"
     player.beside_bar.close_button.click()
@@ -75,6 +79,83 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one
     assert not player.beside_bar.isVisible()
     player._back()
     assert player.beside.second.tape is None
+
+
+def test_each_has_a_name_and_a_colour_of_its_own_in_the_bar_in_plots_and_at_cursors(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    jump(shown, archive, player, 8.0)
+    shown.until(lambda: all(len(plot.drawn) == 1 for plot in player.signals.plots), "gave each a plot")
+    names, plot = player.signals.scene.names, player.signals.plots[0]
+    assert names is not None
+    assert names[0] != names[1], "two recordings of one robot and one second"
+    assert len({*player.beside_bar.said.accessibleDescription().split(", exo-01")}) == 2
+    colours = [one.colour for one in plot.plot._curves]
+    assert len(colours) == len({*colours}) == 2
+    assert not {"left", "right"} & {*colours}, "colours of sides are no colours of recordings"
+    scene, (channel,) = player.signals.scene, plot.drawn
+    player.signals._hovered(-2.0)
+    here, beside = (scene.read(channel, -2.0, beside=one) for one in (False, True))
+    assert here is not None
+    assert beside is not None
+    legend = plot._legend.accessibleDescription()
+    text = plot._text
+    difference = rounded((beside - here) * plot.unit.scale, plot._places, "+")
+    symbol = plot.unit.symbol
+    assert legend == (f"{names[0]} {text(here)}, {names[1]} {text(beside)}, difference {difference} {symbol}")
+    player.beside_bar.cursors.click()
+    shown.draw()
+    table = player.signals.measuring.table
+    told = [[str(table.item(row, column).text()) for column in (0, 1)] for row in range(3)]  # type: ignore[union-attr]
+    assert [name for name, _ in told] == [f"{channel}, {one}" for one in (*names, "difference")]
+    at_a = [float(value.replace("−", "-")) for _, value in told]
+    assert at_a[2] == pytest.approx(at_a[1] - at_a[0], abs=1e-3)
+
+
+def test_while_two_are_compared_plots_have_the_room_of_the_tools_until_these_are_asked_for(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    jump(shown, archive, player, 8.0)
+    shown.until(lambda: player.signals.area.is_paired, "made room")
+    QApplication.processEvents()
+    tools, channels, plots = player.signals.tools, player.signals.channels, player.signals.plots
+    assert not tools.isVisible()
+    assert not channels.isVisible()
+    assert plots[0].y() == plots[1].y(), "left and right beside each other"
+    assert plots[0].plot.height() > 2 * plots[0].plot.minimumSizeHint().height()
+    player.beside_bar.tools.click()
+    assert tools.isVisible()
+    assert channels.isVisible()
+    player.signals.cursors.click()
+    assert player.beside_bar.cursors.isChecked(), "one switch in two places"
+    menu = QMenu()
+    player.signals.beside.fill(menu)
+    menu.actions()[0].trigger()
+    shown.draw()
+    assert player.beside.session is None, "nothing is beside"
+    assert tools.isVisible()
+    assert {len(plot.drawn) for plot in player.signals.plots} == {2}, "arranged as before"
+
+
+def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    jump(shown, archive, player, 8.0)
+    shown.until(lambda: archive.compared.moved, "compared the walks")
+    session, moved = player.beside.session, archive.compared.moved
+    assert session is not None
+    assert moved is not None
+    shown.draw()
+    assert player.beside_bar.cadence.text().startswith("gait cycles: ")
+    assert player.beside_bar.cadence.text().endswith(f": {moved.word}"), "and nothing is said of too few"
+    first = next(one for one in archive.compared.pair or () if one.session != session.session)
+    torque = Measured("left_knee.torque_rms", "torque RMS", "N·m", Word.CHANGED, 10, 12, 20.0, 30.0, 10.0)
+    archive.compared.moved = replace(moved, metrics=(torque,))
+    archive.compared.pair = (first, session)
+    remarks, turned = (CycleRemarks(archive.compared, one, Units()) for one in (first, session))
+    assert remarks.of("left_knee.torque")[0] == "per gait cycle: torque RMS 20 → 30 N·m, differs"
+    assert turned.of("left_knee.torque")[0] == "per gait cycle: torque RMS 30 → 20 N·m, differs"
+    assert remarks.of("left_insole.force") == (), "nothing is measured of it"
 
 
 def test_by_a_heel_strike_their_strides_lie_over_each_other_and_one_that_cannot_be_read_is_said(
@@ -113,7 +194,7 @@ def _cannot_be_read(shown: Shown, player: Player, monkeypatch: pytest.MonkeyPatc
     player.show_beside(session)
     shown.until(lambda: player.beside.problem, "told why not")
     shown.draw()
-    assert "the disk is away" in player.beside_bar.said.text()
+    assert "the disk is away" in player.beside_bar.said.accessibleDescription()
     assert threads[0].startswith("playback"), "a store that hangs must not keep anybody from looking at it"
     player.beside.close()
     player.beside_bar.refresh()
@@ -134,7 +215,8 @@ def test_events_of_both_are_on_the_bar_and_in_the_list(
     said = [action.text() for action in menu.actions() if "at " in action.text()]
     assert [text.partition(":")[2] for text in said] != []
     assert any(text.startswith("0:03.0  stop") for text in said)
-    assert any(text.startswith("0:05.0  ┅ stop") for text in said)
+    assert player.signals.scene.names is not None
+    assert any(text.startswith(f"0:05.0  {player.signals.scene.names[1]} stop") for text in said)
     player._turn(1)
     player._turn(1)
     assert archive.playback.position_ns == first.first_ns + 5_000_000_000

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ml.store.sessions import Session
 from server_gui.core.archive.collected_journals import KeptJournals
+from server_gui.core.archive.label_hits import LabelHits
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.archive.library import Library
 from server_gui.core.archive.playback import Playback
@@ -41,7 +42,9 @@ class Archive:
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
         self.reading = Background("playback")  # what is played, alone or beside; a look never waits for it
         self.playback = Playback(self.reading.do, deliver, desk.shown)
-        self.compared = RecordingComparison(settings, self.reading.do, deliver)
+        self._comparing = Background("comparing")  # reads long: nothing that is played waits for it
+        self.compared = RecordingComparison(settings, self._comparing.do, deliver)
+        self.hits = LabelHits(settings, self._comparing.do, deliver)
         self.labels = SessionLabels(settings, self.reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.models = Models(
@@ -56,7 +59,8 @@ class Archive:
 
     def close(self, within_s: float) -> bool:
         """End everything; False where something hangs, which only the end of the process ends."""
-        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self.reading)]
+        parts = (self.jobs, self.models, self.library, self.reading, self._comparing)
+        ended = [part.close(within_s) for part in parts]
         return all(ended)
 
     def look(self) -> None:

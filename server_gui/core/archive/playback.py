@@ -4,7 +4,7 @@ import time
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final, cast
 
@@ -14,9 +14,11 @@ from msgspec import UNSET
 from drivers.error_codes import error_text
 from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
 from server_gui.core.archive.outline import Outline
+from server_gui.core.archive.recorded_parameters import RecordedParameters
 from server_gui.core.archive.recorded_predictions import PastPrediction
 from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
@@ -84,6 +86,8 @@ class PlayedRobot(Robot):
     stamp_ns: int | None = None  # and on the robot's clock
     rows_per_s: float = 0.0
     is_recording: bool = True
+    # Parameters of its start, where nobody knows of later changes: then these are not known now.
+    at_start: dict[str, ParameterValue] = field(default_factory=dict)
 
     def now_s(self) -> float:
         return self.shown_ns / 1e9
@@ -159,6 +163,7 @@ class Playback:
         self._recall: Recall = nothing_said
         self.happened = TimelineEvents(read, deliver)
         self.outline = Outline(read, deliver)
+        self.parameters = RecordedParameters()
         self._said: dict[str, PastPrediction] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
@@ -184,6 +189,7 @@ class Playback:
         self.desk.select(station)
         self.happened.open(tape, _words(tape, words))
         self.outline.open(tape)
+        self.parameters.open(tape)
         self.seek(tape.first_ns)
 
     def close(self) -> None:
@@ -248,6 +254,8 @@ class Playback:
             self._feed(Rows.joined([piece.rows for piece in shown]))
             self._said |= {one.prediction.task: one for piece in shown for one in piece.said}
         self._fed_ns = target_ns
+        held, told = self.parameters.at(target_ns), self.parameters.told
+        self._robot.parameters, self._robot.at_start = (held, {}) if told else ({}, held)
         return True
 
     def _begin_anew(self, tape: Tape) -> None:
@@ -256,7 +264,7 @@ class Playback:
         self._robot.row_ns = self._robot.stamp_ns = None
         self._said = {}
         station = self.desk.stations[0]
-        station.take([Described(_description(tape, self._jumps, self._words))])
+        station.take([Described(_description(tape, self._jumps, self._words, self.parameters.described))])
         station.predictions.take(Serves(station.name, {}, {"": NOT_PREDICTED}))
 
     def _show_said(self, now_ns: int) -> None:
@@ -334,7 +342,9 @@ def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str
     return usual | dict(told)
 
 
-def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
+def _description(
+    tape: Tape, jumps: int, words: Mapping[str, dict[str, str]], parameters: Sequence[ParameterInfo] = ()
+) -> Description:
     """Return the robot's description, as far as its channels show it."""
     channels = []
     for name, unit in tape.units.items():
@@ -351,7 +361,7 @@ def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) ->
         role="recording",
         components=[ComponentInfo(name, kind, "ok") for name, kind in components.items()],
         channels=channels,
-        parameters=[],
+        parameters=[*parameters],
         modules={},
         clock=Clock(0, 0, f"jump {jumps}"),
         stop=StopInfo(held=False, reason=None, since_ns=None, stopped_again={}, drives={}),

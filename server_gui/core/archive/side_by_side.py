@@ -97,7 +97,7 @@ class SideBySide:
         self._not_opened = ""  # why
         self._wishes = playback.wishes  # of the first, that the second has followed
         self._offset_ns = 0  # of the second's instants after those of the first
-        self._first = playback
+        self.first = playback
         self._settings = settings
         self._do = do
         self._deliver = deliver
@@ -137,20 +137,20 @@ class SideBySide:
 
     def step(self) -> None:
         """Show what is at the instant of the first; a jump of it, or its *play*, tries what failed again."""
-        if self._first.wishes != self._wishes:
-            self._wishes = self._first.wishes
+        if self.first.wishes != self._wishes:
+            self._wishes = self.first.wishes
             self.second.try_again()
-        self.second.follow(self._first.position_ns + self._offset_ns)
+        self.second.follow(self.first.position_ns + self._offset_ns)
 
     def align(self, by: By) -> str:
         """Align them; why that is not possible, else empty, and then nothing has changed."""
-        first, second = self._first.tape, self.second.tape
+        first, second = self.first.tape, self.second.tape
         if first is None or second is None:
             return "the second recording is still read"
         if by is By.START:
             self._offset_ns = second.first_ns - first.first_ns
         else:
-            ours, theirs = (_heel_strike_ns(one.desk.selected) for one in (self._first, self.second))
+            ours, theirs = (_heel_strike_ns(one.desk.selected) for one in (self.first, self.second))
             if ours is None or theirs is None:
                 return "no heel strike is known in one of them up to here: go on a little"
             self._offset_ns = theirs - ours
@@ -158,7 +158,7 @@ class SideBySide:
         return ""
 
     def _opened(self, session: Session, tape: Tape) -> None:
-        first = self._first.tape
+        first = self.first.tape
         if session is not self.session:
             return
         if first is None:

@@ -1,4 +1,4 @@
-"""What has happened on the axis of time: stops, faults, writes, trials, marks; live or of a recording."""
+"""What has happened on the axis of time: stops, faults, buses, writes, marks; live or of a recording."""
 
 import bisect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,6 +27,7 @@ class FlagKind(Enum):
     TRIAL = "trial"
     MARK = "mark"
     DANGER = "danger"  # advice or worse is foreseen, or is over
+    BUS = "bus"  # it fails, is full, or lacks what nodes send
     GAP = "gap"  # of a recording: something of it is missing
     CHANGE = "change"  # of what it was recorded with: a clock, a name, a model that was learned
     RULE = "rule"  # on predictions: it began or ceased to hold, or what came of its stop
@@ -196,6 +197,7 @@ _TOLD: Final = {
     EventKind.MARKER.value: FlagKind.MARK,
     EventKind.DANGER.value: FlagKind.DANGER,
     EventKind.RULE.value: FlagKind.RULE,
+    EventKind.BUS.value: FlagKind.BUS,
     EventKind.NAME.value: FlagKind.CHANGE,
     EventKind.CLOCK_STEP.value: FlagKind.CHANGE,
     EventKind.ADAPTED.value: FlagKind.CHANGE,

@@ -26,7 +26,8 @@ from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
-from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
+from server_gui.core.desk.flag_watch import FlagWatch
+from server_gui.core.desk.flags import Flag, FlagKind, Flags
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.edit_list import EditList
@@ -110,7 +111,7 @@ class Station:
         self._judged: FrameTime | None = None  # by which the alarms were looked for, since anything has come
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
-        self._states = StateWatch()
+        self._happened = FlagWatch()
         self._stalls = Stalls()
         self._back = RevertedTrials(self.robot, self.writing, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
@@ -211,9 +212,6 @@ class Station:
                 case Telemetry():
                     self._look_for_stalls(event)
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
-                    self.flags.add(
-                        *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
-                    )
                     self.flash.clock = event.clock
                     self._show_stop(event)
                 case Looked():
@@ -222,8 +220,6 @@ class Station:
                 case Journalled():
                     self.audit.take(event.journal.entries)
                     self.stopping.read(event.journal.entries, self.robot.boot_id)
-                    if before is not None:
-                        self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():
                     self._described(event.description, before)
                 case Costs():
@@ -235,6 +231,7 @@ class Station:
                     self.predictions.clear()
                     self.flash.forget()
                     self._stalls.forget()
+            self.flags.add(*self._happened.take(event, self.robot, self.rings.newest_ns))
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
@@ -257,7 +254,7 @@ class Station:
         if is_another:
             self.rings.clear()
             self.flags.clear()
-            self._states, self.flash.clock = StateWatch(), None
+            self._happened, self.flash.clock = FlagWatch(), None
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
         self.stopping.described(description.stop.held, description.stop.reason, is_anew=is_another)
         if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):

@@ -8,6 +8,7 @@ from gateway.client import ConnectionState
 from gateway.wire.robot import Description
 from server_gui.core.fleet import session_facts
 from server_gui.core.follow.events import (
+    BusesSeen,
     Described,
     Event,
     Identified,
@@ -18,6 +19,8 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.missing_pdos import MissingPdos
+from server_gui.core.processing.bus_turns import BusTurns
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import NOBODY, Facts, Worn
@@ -43,6 +46,7 @@ class RobotRecording:
         self._facts = Facts()
         self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
+        self._pdos, self._turns = MissingPdos(), BusTurns()
         self._is_paused = False
         self._description: Description | None = None  # the newest
 
@@ -84,6 +88,10 @@ class RobotRecording:
                 self._learn(parameters=found | known)
             case LinkChanged():
                 self._link_changed(event)
+            case BusesSeen():
+                buses = None if event.buses is None else self._pdos.take(event.buses, event.at_ns)
+                for text in self._turns.take(buses, event.at_ns):
+                    self._recorder.event(self._robot, EventKind.BUS, text)
             case Refused():
                 self._recorder.refused(self._robot, event.what, event.reason)
 

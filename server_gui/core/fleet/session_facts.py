@@ -69,6 +69,7 @@ def setup(description: Description) -> dict[str, str | float]:
         if part.calibration is not UNSET:
             found[f"calibration/{part.name}"] = part.calibration or NO_FILE
     for known in description.parameters:
+        found[f"object/{known.name}"] = f"{known.object} {known.unit}".rstrip()
         if known.read_only is None:
             found[f"limits/{known.name}"] = _limits(known)
     for rule in description.guard.rules:

@@ -32,6 +32,7 @@ class EventKind(Enum):
     FORGOTTEN = "forgotten"  # everything of a wearer was removed; who that was is a hash
     DANGER = "danger"  # advice or worse was foreseen, or was over, or was no longer known
     ADAPTED = "adapted"  # a model that was learned from the wearer's walk serves, or serves no more
+    BUS = "bus"  # a bus of the robot failed, was full, or lacked what nodes send
     RULE = "rule"  # a rule on predictions began or ceased to hold, or what came of the stop that it asked for
 
 

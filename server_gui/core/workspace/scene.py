@@ -57,9 +57,11 @@ class Scene:
         self.beside: Beside | None = None
         self.align = Align.NOW
         self.nudge_s = 0.0
+        self.remarks: Mapping[str, tuple[str, ...]] = {}  # on curves, while nobody points; the fullest first
         self.channels: Channels = {}
         self._shift_ns: int | None = 0  # before the nudge; None: the two have nothing in common
         self._shown = shown
+        self._named = ("", "")  # what is looked at, and what is beside it
         self._station: Station | None = None
         self._series: Series | None = None
         self._theirs: Channels = {}
@@ -92,7 +94,7 @@ class Scene:
             for one in (station, other)
             if one
         ]
-        return (*described, self._shown.revision, self.workspace.revision)
+        return (*described, self._named, self._shown.revision, self.workspace.revision)
 
     # --- what is drawn
 
@@ -295,9 +297,13 @@ class Scene:
 
     # --- beside
 
-    def put_beside(self, station: Station | None) -> None:
-        """Show this robot, or recording, beside the one that is looked at; None: nothing."""
+    def put_beside(self, station: Station | None, names: tuple[str, str] = ("", "")) -> None:
+        """Show this robot, or recording, beside the one that is looked at; None: nothing.
+
+        `names` are of both, where their titles would not tell them apart.
+        """
         self.beside = None if station is None else Beside(station)
+        self._named, self.remarks = names, {}
         self._shift_ns, self.nudge_s, self.frozen = 0, 0.0, None
 
     def _align(self, station: Station) -> None:
@@ -306,15 +312,28 @@ class Scene:
         self._shift_ns = shift_ns(station, self.beside.station, self.align, self._shift_ns or 0)
         self.beside.shift_ns = (self._shift_ns or 0) + round(self.nudge_s * 1e9)
 
+    @property
+    def names(self) -> tuple[str, str] | None:
+        """What tells both apart; None where nothing is beside."""
+        if self.beside is None or self._station is None:
+            return None
+        both = self._station, self.beside.station
+        titles = [f"recording of {one.title}" if one.robot.is_recording else one.title for one in both]
+        here, beside = (given or title for given, title in zip(self._named, titles, strict=True))
+        return here, beside
+
     def beside_text(self) -> str:
-        """Return the companion's name, and the alignment of both."""
+        """Return the companion's name, and the alignment of both; empty where both are played together.
+
+        By what recordings are aligned stands where that is chosen.
+        """
         if self.beside is None or self._station is None:
             return ""
         if self._station.robot.is_recording and self.beside.station.robot.is_recording:
-            return f"┅ {self.beside.station.title}, played together"  # by what, stands where it is chosen
+            return ""
         said = offset_text(self._station, self.beside.station, self._shift_ns, self.nudge_s)
         by = "their clocks" if self.align is Align.NOW else self.align.value
-        return f"┅ {self.beside.station.title}, aligned by {by}: {said}"
+        return f"─ {self.beside.station.title}, aligned by {by}: {said}"
 
 
 def _faults(station: Station, channel: str, rows: int) -> Floats:

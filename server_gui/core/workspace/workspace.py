@@ -57,6 +57,15 @@ class Workspace:
         self.plots = [PlotSpec(list(plot.curves), plot.x) for plot in plots]
         self.revision += 1
 
+    def split(self) -> None:
+        """Give each curve over time a plot of its own, as far as there is room for plots."""
+        found: list[PlotSpec] = []
+        for number, plot in enumerate(self.plots):
+            later = len(self.plots) - number - 1
+            fits = not plot.is_xy and len(found) + len(plot.curves) + later <= MOST_PLOTS
+            found += [PlotSpec([text]) for text in plot.curves] if fits else [plot]
+        self.show([PlotSpec(list(plot.curves), plot.x) for plot in found])
+
     def put(self, meant: CurveBinding, units: Sequence[Unit | None]) -> None:
         """Put a curve where its like is, else into a plot of its own; `units` has that of each plot.
 

@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.units import Unit, with_minus
+from gateway.wire.parameter import ParameterValue
+from server_gui.core.archive.playback import PlayedRobot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import row_at
 from server_gui.core.desk.station import Station
@@ -22,6 +24,9 @@ SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
 SEEN: Final = ("limit ", "limit ", "")  # before limits in the legend, the fullest first
 BEYOND: Final = ("beyond the plot: limit ", "limit ", "")  # likewise, of those that are out of its range
+# Likewise, where nobody knows of changes since the beginning of a recording.
+SEEN_AT_START: Final = ("limit at the start ", "start ", "start ")
+BEYOND_AT_START: Final = ("beyond the plot: limit at the start ", "start ", "start ")
 HINT: Final = (
     "Wheel: time · double click: all of it · click: open in Signals. "
     "┅ limit: its line · ↕ limit: beyond the range, where an arrow stands at the edge"
@@ -107,18 +112,20 @@ class KeyPlot(Card):
         told = {word: unit.text(value) for (_, _, word), value in zip(self._curves, values, strict=True)}
         inks = [css(self._theme, colour if live else "old") for _, colour, _ in self._curves]
         seen, beyond = self._limits_told(station, unit)
+        at_start = bool(_at_start(station))
+        of_seen, of_beyond = (SEEN_AT_START, BEYOND_AT_START) if at_start else (SEEN, BEYOND)
 
         def parts(texts: Collection[str], wording: int, words: Mapping[str, str]) -> list[Part]:
             named, drawn = zip(inks, self._curves, texts, strict=True), "" if words else "━"
             curves = [(ink, drawn, f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
             bad = css(self._theme, "bad")
-            lines = [(bad, "┅", f"{SEEN[wording]}{seen}")] if seen else []
-            return [*curves, *lines, *([(bad, "↕", f"{BEYOND[wording]}{beyond}")] if beyond else [])]
+            lines = [(bad, "┅", f"{of_seen[wording]}{seen}")] if seen else []
+            return [*curves, *lines, *([(bad, "↕", f"{of_beyond[wording]}{beyond}")] if beyond else [])]
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
         wordings: tuple[tuple[int, Mapping[str, str]], ...] = (0, {}), (1, {}), (2, {}), (2, LETTERS)
         fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
-        self.legend.say(parts(told.values(), *next(fits, wordings[2])))
+        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if at_start else 2])))
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
         )
@@ -177,8 +184,9 @@ class KeyPlot(Card):
         known = (
             () if not wanted or station.robot.description is None else station.robot.description.parameters
         )
+        of_now = station.robot.parameters or _at_start(station)
         held = [
-            station.robot.parameters.get(info.name)
+            of_now.get(info.name)
             for info in known
             if info.component in parts
             and info.object.lower().startswith(wanted)
@@ -192,6 +200,11 @@ class KeyPlot(Card):
 
     def _resize(self) -> None:
         self.plot.setMinimumHeight(self._theme.px(48))
+
+
+def _at_start(station: Station) -> Mapping[str, ParameterValue]:
+    """Return the parameters of a recording's start, where nobody knows of later changes."""
+    return station.robot.at_start if isinstance(station.robot, PlayedRobot) else {}
 
 
 def _limit_texts(limits: Sequence[float], unit: Unit) -> str:

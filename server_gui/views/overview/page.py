@@ -140,7 +140,8 @@ class Overview(QWidget):
         """
         window, bars = self.window(), self.window().findChildren(QToolBar)  # the demo's
         high = window.height() - sum(bar.height() for bar in bars if bar.isVisible())
-        room = window.width(), high, self._theme.scale, self._model.rowCount(), self._columns
+        rows, is_first = self._model.rowCount(), self.is_numbers_first
+        room = window.width(), high, self._theme.scale, rows, self._columns, is_first
         looks = 1 if room != self._ordered_for else self._looks
         if looks <= LOOKS:
             self._ordered_for, self._looks = room, looks + 1

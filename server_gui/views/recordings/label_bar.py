@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from ml.store.labels import ACTIVITIES, INSTANTS, Label
+from server_gui.core.archive.label_hits import LabelHits
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.cloud.tape import Tape
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
@@ -30,14 +31,17 @@ LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 class LabelBar(QWidget):
     """Bar for labelling the chosen span of the timeline."""
 
-    def __init__(self, labels: SessionLabels, timeline: Timeline, theme: Theme) -> None:
+    def __init__(self, labels: SessionLabels, hits: LabelHits, timeline: Timeline, theme: Theme) -> None:
         super().__init__()
+        self._hits = hits
         self._labels = labels
         self._timeline = timeline
         self._theme = theme
         self._tape: Tape | None = None
         self._revision = -1
         self.span, self.said = ShrinkingLabel("dim"), WrappingLabel("dim")
+        self.right = WrappingLabel("dim")  # of what was predicted
+        self.right.hide()
         self.list = QListWidget()
         self.list.setAccessibleName("Labels of this recording")
         self.list.setObjectName("framed")
@@ -50,6 +54,7 @@ class LabelBar(QWidget):
         left.addLayout(self._span_row())
         left.addLayout(self._label_row())
         left.addWidget(self.said)
+        left.addWidget(self.right)
         left.addStretch(1)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
@@ -69,6 +74,15 @@ class LabelBar(QWidget):
             set_text(self.said, self._labels.said or self._hint())
             self._timeline.show_labels(self._labels.labels)
             self._fill(tape)
+        if self.isVisible():
+            self._look_for_hits(tape, span)
+
+    def _look_for_hits(self, tape: Tape, span: tuple[int, int] | None) -> None:
+        """Say how right predictions were in the span, or in all of it, while labels are looked at."""
+        within = span or (tape.first_ns, tape.last_ns + 1)
+        self._hits.look(tape.session, within, self._labels.labels)
+        set_text(self.right, self._hits.text)
+        self.right.setVisible(bool(self._hits.text))
 
     # --- how it is put together
 

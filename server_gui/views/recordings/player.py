@@ -20,15 +20,18 @@ from PySide6.QtWidgets import (
 from gateway.plain_text import plain
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
-from server_gui.core.archive.playback import SPEEDS, PlayedRobot
+from server_gui.core.archive.cycle_remarks import CycleRemarks
+from server_gui.core.archive.playback import SPEEDS, Playback, PlayedRobot
 from server_gui.core.archive.recorded_notes import RecordedNotes
+from server_gui.core.archive.recording_names import short_names
 from server_gui.core.archive.side_by_side import SideBySide
-from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.desk.flags import Flag
+from server_gui.core.desk.station import Station
 from server_gui.core.workspace.alignment import Align
+from server_gui.core.workspace.workspace import PlotSpec
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import STOPPED, UNSEEN, status
@@ -72,9 +75,9 @@ class Player(QWidget):
         self._theme = theme
         self._frame = 0
         self._worded = 0, False  # the instant of which the words are, and whether it was being read
-        self._told: dict[TimelineEvents, object] = {}  # the recording and the journal that it knows of
+        self._told: dict[Playback, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
-        self.overview.is_numbers_first = False  # a walk is replayed for how it looked
+        self.overview.is_numbers_first = False  # a walk is replayed for how it looked, until a drive fails
         notes = RecordedNotes(self._playback, archive.labels)
         self.beside = SideBySide(self._playback, archive.settings, archive.reading.do, archive.deliver)
         self.signals = Signals(
@@ -84,7 +87,13 @@ class Player(QWidget):
             others=lambda: self.beside.second.desk.stations,
             step=self.beside.step,
         )
-        self.beside_bar = BesideBar(self.beside)
+        self.beside_bar = BesideBar(self.beside, theme)
+        self.beside_bar.closed.connect(self._end_comparing)
+        self.beside_bar.arranged.connect(self.signals.show_tools)
+        self.beside_bar.measured.connect(self.signals.cursors.setChecked)
+        self.signals.cursors.toggled.connect(self.beside_bar.cursors.setChecked)
+        self._before: list[PlotSpec] | None = None  # the plots, before two recordings were compared
+        self._remarked: object = None  # the comparison that the remarks are of
         self._views = (self.overview, self.signals)
         self._settling = 0  # frames until what is beside has its place
         self._was_wrong = False  # in what was played of it
@@ -105,7 +114,7 @@ class Player(QWidget):
         self.timeline.toggled.connect(self._toggle)
         self.timeline.turned.connect(self._turn)
         self._flags: tuple[tuple[Flag, ...], tuple[Flag, ...]] = ((), ())  # of it, and of what is beside it
-        self.labels = LabelBar(archive.labels, self.timeline, theme)
+        self.labels = LabelBar(archive.labels, archive.hits, self.timeline, theme)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.setSpacing(6)
@@ -133,6 +142,7 @@ class Player(QWidget):
         alone = not self._has_room_for_all and self.labelling.isChecked()
         with_now = self._is_roomy or not (alone or self._was_wrong)  # an alarm says more of the drives
         self.overview.show_plots_alone(alone, with_now=with_now)
+        self.timeline.be_low(not self._has_room_for_all)
 
     def heightForWidth(self, width: int) -> int:
         """As low as it can be: what scrolls it would give the views all that they would like to have."""
@@ -148,13 +158,15 @@ class Player(QWidget):
             self._around = None
             self.beside.close()
             self.beside_bar.refresh()
-            self._was_wrong = False
+            self._end_comparing()
+            self._was_wrong = self.overview.is_numbers_first = False
             self._make_room()
             self.alarms.list.hide()
             self.alarms.hide()
 
     def show_beside(self, session: Session) -> None:
         """Show another recording in the same plots: what is played goes on with it from its beginning."""
+        self._end_comparing()
         self.beside.open(session)
         self.beside_bar.refresh()
         self.labelling.setChecked(self._has_room_for_all)
@@ -192,13 +204,55 @@ class Player(QWidget):
     def _refresh_beside(self) -> None:
         """Bring the second recording into the plots once it is there."""
         station, scene = self.beside.station, self.signals.scene
-        if station is not None and (scene.beside is None or scene.beside.station is not station):
-            scene.put_beside(station)
-            scene.align = Align.NOW
-            self._settling = SETTLES
+        if station is not None and scene.beside is None and self._before is not None:
+            self.beside_bar.close_button.click()  # it was put away in the menu of the signals
+        elif station is not None and (scene.beside is None or scene.beside.station is not station):
+            self._put_beside(station)
         elif self._settling and self.signals.cards:
-            self._settling -= 1  # tools and channels may take all of a small screen
+            if self._before is None:
+                self._before = list(scene.workspace.plots)
+                scene.workspace.split()
+                self.signals.area.pair(on=True)
+                self.signals.show_tools(on=False)
+                self._make_room()
+            self._settling -= 1
             bring_into_sight(self.signals.cards[0], first=True)
+        self._remark()
+
+    def _put_beside(self, station: Station) -> None:
+        """Compare both: in plots of a channel each, which have the room of the tools."""
+        scene, (first, second) = (
+            self.signals.scene,
+            (one.tape for one in (self._playback, self.beside.second)),
+        )
+        if first is None or second is None:
+            return
+        scene.put_beside(station, short_names(first, second))
+        scene.align = Align.NOW
+        self._settling = SETTLES
+        self._archive.compared.open(first.session, second.session)
+
+    def _remark(self) -> None:
+        """Say of each curve what the gait cycles of both say, once that is known."""
+        scene, compared, first = self.signals.scene, self._archive.compared, self._playback.tape
+        seen = compared.revision, scene.beside, tuple(scene.workspace.curves), self._archive.shown_units
+        if scene.beside is None or first is None or seen == self._remarked:
+            return
+        self._remarked = seen
+        remarks = CycleRemarks(compared, first.session, self._playback.desk.shown.units)
+        scene.remarks = {text: remarks.of(text) for text in scene.workspace.curves}
+        self.beside_bar.cadence.say(*remarks.cadence)
+
+    def _end_comparing(self) -> None:
+        """Arrange the plots as they were, with the tools."""
+        before, self._before, self._settling = self._before, None, 0
+        for button in (self.beside_bar.cursors, self.beside_bar.tools):
+            button.setChecked(False)
+        self.signals.area.pair(on=False)
+        self.signals.show_tools(on=True)
+        if before is not None:
+            self.signals.scene.workspace.show(before)
+        self._make_room()
 
     # --- how it is put together
 
@@ -287,7 +341,7 @@ class Player(QWidget):
         """Show what was wrong then; once something was, its line stays, so that nothing moves again."""
         self.alarms.refresh()
         if self.alarms.told and not self._was_wrong:
-            self._was_wrong = True
+            self._was_wrong = self.overview.is_numbers_first = True
             self._make_room()
         is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
         self.alarms.setVisible(self._was_wrong and not is_in_the_way)
@@ -296,19 +350,22 @@ class Player(QWidget):
         self._archive.journals.look()
         for playback in (self._playback, self.beside.second):
             if playback.tape is not None:
-                self._tell(playback.happened, playback.tape)
+                self._tell(playback, playback.tape)
         flags = tuple(self._playback.happened.flags), tuple(self.beside.flags)
         if flags != self._flags:
             self._flags = flags
-            self.timeline.show_flags(*flags)
+            names = self.signals.scene.names
+            self.timeline.show_flags(*flags, "" if names is None else names[1])
 
-    def _tell(self, happened: TimelineEvents, tape: Tape) -> None:
+    def _tell(self, playback: Playback, tape: Tape) -> None:
         """Tell it what the robot's journal has of that time."""
         journals = self._archive.journals
         kept, told = journals.found.by_robot.get(tape.session.robot), (tape, journals.revision)
-        if kept is not None and self._told.get(happened) != told:
-            self._told[happened] = told
-            happened.tell(entry for stretch in kept.stretches for entry in stretch)
+        if kept is not None and self._told.get(playback) != told:
+            self._told[playback] = told
+            entries = [entry for stretch in kept.stretches for entry in stretch]
+            playback.happened.tell(entries)
+            playback.parameters.tell(entries, tape.first_ns, tape.last_ns)
 
     def _list_events(self, menu: QMenu) -> None:
         tape = self._playback.tape
@@ -328,7 +385,8 @@ class Player(QWidget):
         return sorted((*ours, *within), key=lambda one: one.at_ns)
 
     def _turn(self, way: int) -> None:
-        at_ns, found = self._playback.position_ns, self._in_order
+        at_ns = self._playback.position_ns
+        found = [flag for flag in self._in_order if self.timeline.is_within(flag)]
         later = (flag for flag in found if flag.at_ns > at_ns)
         earlier = (flag for flag in reversed(found) if flag.at_ns < at_ns)
         flag = next(later if way > 0 else earlier, None)
@@ -340,6 +398,9 @@ class Player(QWidget):
         if tape is None:
             return ""
         what = f"▶ PLAYBACK, not live: {tape.session.robot}, {day_text(playback.position_ns)}"
+        if self.beside.session is not None:  # when each began stands below
+            since = clock_text((playback.position_ns - tape.first_ns) / SECOND_NS, 1)
+            what = f"▶ PLAYBACK, not live: two recordings at {since}"
         if playback.problem:
             return f"{what}. It cannot be read: {playback.problem}"
         if playback.is_loading:
@@ -366,6 +427,7 @@ class Player(QWidget):
 
     def _back(self) -> None:
         self.beside.close()
+        self._end_comparing()
         self._playback.close()
         self.left.emit()
 

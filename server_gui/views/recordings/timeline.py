@@ -28,9 +28,8 @@ STEPS: Final = {
 TICKS_S: Final = (1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 43200, 86400)
 # Paul Tol's light scheme, for labels: no two of them alike to those who see fewer colours.
 HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#aaaa00")
-BAR: Final = 40  # high, at text of 100 %
+BAR, LOW_BAR = 40, 26  # high, at text of 100 %: and where there is little room
 LABELLED: Final = 0.42  # of which labels take so much, at its bottom
-DASHED: Final = "┅ "  # begins what is of the recording beside
 
 
 TIP: Final = (
@@ -56,6 +55,8 @@ class Timeline(QWidget):
         self._labels: Sequence[Label] = ()
         self._flags: Sequence[Flag] = ()
         self._beside: Sequence[Flag] = ()
+        self._bar_px = BAR
+        self._other = ""  # what the recording beside is called
         self._outline: Outline | None = None
         self._outlined = -1  # its revision
         self._dragged_from_ns: int | None = None
@@ -68,12 +69,20 @@ class Timeline(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
-        return QSize(400, self._theme.px(34 + BAR))
+        return QSize(400, self._theme.px(34 + self._bar_px))
 
     def show_tape(self, tape: Tape) -> None:
         """Show another recording."""
         self._tape, self._labels, self._flags, self._beside, self.span_ns = tape, (), (), (), None
         self.show_position(tape.first_ns)
+
+    def be_low(self, low: bool) -> None:
+        """Leave room to what is above."""
+        wanted = LOW_BAR if low else BAR
+        if wanted != self._bar_px:
+            self._bar_px = wanted
+            self.updateGeometry()
+            self.update()
 
     def show_position(self, position_ns: int) -> None:
         """Show where it is played."""
@@ -87,9 +96,9 @@ class Timeline(QWidget):
         self._labels = labels
         self.update()
 
-    def show_flags(self, flags: Sequence[Flag], beside: Sequence[Flag] = ()) -> None:
-        """Show what happened when; `beside`: in a second recording, dashed as its curves are."""
-        self._flags, self._beside = flags, beside
+    def show_flags(self, flags: Sequence[Flag], beside: Sequence[Flag] = (), other: str = "") -> None:
+        """Show what happened when; `beside`: in a second recording, which is called `other`, dashed."""
+        self._flags, self._beside, self._other = flags, beside, other
         self.update()
 
     def show_outline(self, outline: Outline) -> None:
@@ -100,7 +109,13 @@ class Timeline(QWidget):
 
     def told(self, flag: Flag) -> str:
         """Return what happened, in words."""
-        return f"{'' if flag in self._flags else DASHED}{flag.kind.value}: {flag.text}"
+        whose = "" if flag in self._flags else f"{self._other} "
+        return f"{whose}{flag.kind.value}: {flag.text}{self._outside(flag)}"
+
+    def _outside(self, flag: Flag) -> str:
+        if self._tape is None or self.is_within(flag):
+            return ""
+        return ", before its beginning" if flag.at_ns < self._tape.first_ns else ", after its end"
 
     def choose(self, begin_ns: int, end_ns: int) -> None:
         """Choose a span."""
@@ -259,7 +274,7 @@ class Timeline(QWidget):
     def _draw_beside(self, painter: QPainter, bar: QRectF) -> None:
         """Through the bar, with a smaller mark: what happened in the second recording."""
         for flag in self._beside:
-            if not self._is_within(flag):
+            if not self.is_within(flag):
                 continue
             mark, x, side = FLAGS[flag.kind], self._x(flag.at_ns), float(self._theme.px(8))
             colour = self._theme.colour(mark.colour)
@@ -267,13 +282,16 @@ class Timeline(QWidget):
             painter.drawLine(QPointF(x, bar.top()), QPointF(x, bar.bottom()))
             draw(painter, mark, colour, QRectF(x - side / 2, bar.top() - side - 1, side, side))
 
-    def _is_within(self, flag: Flag) -> bool:
+    def is_within(self, flag: Flag) -> bool:
+        """Return whether it happened in the recording: before and after it, the bar has no place for it."""
         return self._tape is not None and self._tape.first_ns <= flag.at_ns <= self._tape.last_ns
 
     def _draw_flags(self, painter: QPainter, bar: QRectF) -> None:
         """As in the plots: where several have no room, the worst."""
         side = float(self._theme.px(11))
-        for x, kind in told([(self._x(flag.at_ns), flag.kind) for flag in self._flags], side):
+        for x, kind in told(
+            [(self._x(flag.at_ns), flag.kind) for flag in filter(self.is_within, self._flags)], side
+        ):
             mark, box = FLAGS[kind], QRectF(x - side / 2, bar.top() - side - 1, side, side)
             draw(painter, mark, self._theme.colour(mark.colour), box)
 
@@ -284,7 +302,7 @@ class Timeline(QWidget):
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)
-        flags = [*self._flags, *filter(self._is_within, self._beside)]
+        flags = [*filter(self.is_within, self._flags), *filter(self.is_within, self._beside)]
         pointed = [flag for flag in flags if abs(self._x(flag.at_ns) - place.x()) <= near]
         return min(pointed, key=lambda flag: FIRST.index(flag.kind), default=None)  # as it is drawn
 
@@ -293,7 +311,7 @@ class Timeline(QWidget):
 
     def _bar(self) -> QRectF:
         px = self._theme.px
-        return QRectF(px(16), px(13), max(self.width() - px(32), 1), px(BAR))
+        return QRectF(px(16), px(13), max(self.width() - px(32), 1), px(self._bar_px))
 
     def _x(self, instant_ns: int) -> float:
         if self._tape is None:

@@ -16,7 +16,6 @@ from server_gui.core.desk.flags import FlagKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import CursorLayout, Cursors
-from server_gui.views.widgets.faint import faint
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
 from server_gui.views.widgets.value_axis import ValueAxis
@@ -43,7 +42,7 @@ class Curve:
 
     channel: str
     colour: str
-    dashed: bool = False
+    thin: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -401,16 +400,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(
-            tuple(ink(theme, curve).rgba() for curve in self._curves),
-            tuple(curve.dashed for curve in self._curves),
+            tuple(theme.colour(curve.colour).rgba() for curve in self._curves),
+            tuple(curve.thin for curve in self._curves),
             theme.colour("card").rgba(),
         )
-
-
-def ink(theme: Theme, curve: Curve) -> QColor:
-    """Return the colour that a curve is drawn in: what is dashed stands back, and is seen all the same."""
-    colour = theme.colour(curve.colour)
-    return faint(colour, theme.colour("card")) if curve.dashed else colour
 
 
 def css(theme: Theme, name: str) -> str:

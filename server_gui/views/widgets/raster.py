@@ -17,7 +17,6 @@ Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint32]
 Places = npt.NDArray[np.int64]
 SAMPLES_A_COLUMN: Final = 2  # where there are fewer points, the line between them is sampled so often
-DASH: Final = 5  # columns on, columns off
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +37,10 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Inks:
-    """A colour (0xAARRGGBB) a curve, which are dashed (then others are bold), and what is behind them."""
+    """A colour (0xAARRGGBB) a curve, which are thin (then others are bold), and what is behind them."""
 
     colours: tuple[int, ...] = ()
-    dashed: tuple[bool, ...] = ()
+    thin: tuple[bool, ...] = ()
     behind: int = 0
 
 
@@ -113,8 +112,6 @@ class Strip:
         bold = _bold(inks, len(curves))
         _widen(low, high, columns[starts], bold)
         seen = ~unknown & (high >= view.low) & (low <= view.high) & (columns[starts] >= first)
-        if any(inks.dashed):
-            seen &= ~np.array(inks.dashed)[:, None] | (columns[starts] // DASH % 2 == 0)
         curve, column = np.nonzero(seen)
         top, bottom = _rows(high[seen], view), _rows(low[seen], view)
         bottom = np.minimum(bottom + bold[curve], view.height - 1)
@@ -123,8 +120,8 @@ class Strip:
 
 
 def _bold(inks: Inks, count: int) -> npt.NDArray[np.bool_]:
-    """Return which curves are two pixels thick: those beside dashed ones, which are one."""
-    return ~np.array(inks.dashed, np.bool_) if any(inks.dashed) else np.zeros(count, np.bool_)
+    """Return which curves are two pixels thick: those beside thin ones, which are one."""
+    return ~np.array(inks.thin, np.bool_) if any(inks.thin) else np.zeros(count, np.bool_)
 
 
 def _widen(low: Floats, high: Floats, columns: Places, bold: npt.NDArray[np.bool_]) -> None:

@@ -26,7 +26,7 @@ class BesideMenu(QPushButton):
         self._stations = stations
         self._say = say
         self.setAccessibleName("Show another robot, or a recording, beside this one")
-        self.setToolTip("Another robot, or the recording that is played, in the same plots, dashed")
+        self.setToolTip("Another robot, or the recording that is played, in the same plots, thin")
         menu = QMenu(self)
         menu.aboutToShow.connect(lambda: self.fill(menu))
         self.setMenu(menu)

@@ -1,6 +1,6 @@
 """Draws what a scene shows into its cards, and says what they show."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -62,7 +62,21 @@ def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float |
             card.show_values(scene.read(card.over.text, at_s), values, live=live, when=when)
             continue
         theirs = [] if scene.beside is None else [scene.read(text, at_s, beside=True) for text in card.drawn]
-        card.show_values(values, theirs, live=live, when=when)
+        alone = card.drawn[0] if len(card.drawn) == 1 and at_s is None else ""
+        card.show_values(values, theirs, live=live, notes=scene.remarks.get(alone) or (when,))
+
+
+def columns(scene: Scene, text: str, times: Floats) -> Iterator[tuple[str, Floats]]:
+    """Yield a curve's name and values at these times; with something beside, of both, and how they differ."""
+    name, values = scene.meaning(text).name, scene.values(text, len(times))
+    if scene.names is None:
+        yield name, values
+        return
+    here, beside = scene.names
+    theirs = scene.values_beside(text, times)
+    yield f"{name}, {here}", values
+    yield f"{name}, {beside}", theirs
+    yield f"{name}, difference", theirs - values
 
 
 def flag(scene: Scene, cards: Sequence[AnyPlot], found: Sequence[Flag], newest_ns: int) -> None:

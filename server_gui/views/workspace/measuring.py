@@ -12,12 +12,14 @@ from server_gui.core.desk.measuring import Measured
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
-SPARE: Final = (7, 5, 4, 6, 8)  # left out in this order where there is less room
-NAME: Final = 130  # wide at least, at text of 100 %: a channel
-ROWS: Final = 6  # that are in sight at most
+OF_SPAN: Final = (4, 5, 6, 7)  # columns over the visible span: below the others where there is less room
+OF_CURSORS: Final = (1, 2, 3)
+NAME: Final = 220  # wide at least, at text of 100 %: a channel; a narrower table is scrolled
+ROWS, FEW_ROWS = 6, 4  # that are in sight at most, of one table and of two
 FAR: Final = 10  # samples, with Shift
 KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
 STEPS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
@@ -36,18 +38,13 @@ class Measuring(Card):
         self._theme = theme
         self.setAccessibleName("Cursors: A or B chooses one, the arrows move it, with Shift further")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.table = QTableWidget(0, len(TITLES))
-        self.table.setHorizontalHeaderLabels(TITLES)
-        self.table.setAccessibleName("What is measured")
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.table.setShowGrid(False)
-        self.table.verticalHeader().hide()
-        columns.prepare(self.table)
+        self.table = _table("What is measured")
+        self.below = _table("What is measured over the visible span")
+        self.below.hide()
         self.times = WrappingLabel("title")
         self.body.addWidget(self.times)
         self.body.addWidget(self.table)
+        self.body.addWidget(self.below)
         self.hide()
 
     def show_readings(self, a_s: float, b_s: float, active: int, rows: Sequence[Row]) -> None:
@@ -58,8 +55,8 @@ class Measuring(Card):
         said = f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}"
         set_text(self.times, with_minus(said))
         if self.table.rowCount() != len(rows):
-            self.table.setRowCount(len(rows))
-            self._fit(len(rows))
+            for table in (self.table, self.below):
+                table.setRowCount(len(rows))
         for place, (name, unit, found) in enumerate(rows):
             values = (found.a, found.b, found.difference, found.low, found.high, found.mean, found.sd)
             texts = (name, *(_text(unit, value) for value in values), unit.symbol)
@@ -90,25 +87,56 @@ class Measuring(Card):
         self._share()
 
     def _share(self) -> None:
-        """Numbers are whole: of less room names give up their middle, then columns go."""
-        columns.fit(self.table, {0: self._theme.px(NAME)}, SPARE)
+        """Numbers are whole: with less room those of the span have a table of their own, below."""
+        is_split = self._wanted() > self.table.viewport().width()
+        self.below.setVisible(is_split)
+        name = {0: self._theme.px(NAME)}
+        columns.fit(self.table, name, unwanted=OF_SPAN if is_split else ())
+        columns.fit(self.below, name, unwanted=OF_CURSORS)
+        rows = min(self.table.rowCount(), FEW_ROWS if is_split else ROWS)
+        for table in (self.table, self.below):
+            self._fit(table, rows)
 
-    def _fit(self, rows: int) -> None:
+    def _wanted(self) -> int:
+        """Return how wide one table is with every name and number whole."""
+        titles = columns.title_widths(self.table)
+        return sum(max(self.table.sizeHintForColumn(one), title) for one, title in enumerate(titles))
+
+    def _fit(self, table: QTableWidget, rows: int) -> None:
         height = self._theme.px(20)
-        self.table.verticalHeader().setDefaultSectionSize(height)
-        header = self.table.horizontalHeader().sizeHint().height()
-        self.table.setFixedHeight(header + min(rows, ROWS) * height + 2)
+        table.verticalHeader().setDefaultSectionSize(height)
+        header = table.horizontalHeader().sizeHint().height()
+        is_wide = columns.header_of(table).length() > table.viewport().width()
+        bar = table.horizontalScrollBar().sizeHint().height() if is_wide else 0
+        if table.height() != header + rows * height + 2 + bar:
+            table.setFixedHeight(header + rows * height + 2 + bar)
 
     def _set(self, row: int, column: int, text: str) -> None:
-        item = self.table.item(row, column)
-        if item is None:
-            item = QTableWidgetItem()
-            self.table.setItem(row, column, item)
-            if 0 < column < len(TITLES) - 1:
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                item.setFont(self._theme.number_font())
-        if item.text() != text:
-            item.setText(text)
+        for table in (self.table, self.below):
+            item = table.item(row, column)
+            if item is None:
+                item = QTableWidgetItem()
+                table.setItem(row, column, item)
+                if 0 < column < len(TITLES) - 1:
+                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                    item.setFont(self._theme.number_font())
+            if item.text() != text:
+                item.setText(text)
+                if column == 0:
+                    set_tip(item, text)
+
+
+def _table(name: str) -> QTableWidget:
+    table = QTableWidget(0, len(TITLES))
+    table.setHorizontalHeaderLabels(TITLES)
+    table.setAccessibleName(name)
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+    table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    table.setShowGrid(False)
+    table.verticalHeader().hide()
+    columns.prepare(table)
+    return table
 
 
 def _text(unit: Unit, value: float | None) -> str:

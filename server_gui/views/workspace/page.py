@@ -30,7 +30,7 @@ from server_gui.views.widgets.scroll_area import bring_into_sight
 from server_gui.views.widgets.split import Split
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree
-from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
+from server_gui.views.workspace.drawing import AnyPlot, columns, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
 from server_gui.views.workspace.layout_menu import LayoutMenu
 from server_gui.views.workspace.measuring import Measuring
@@ -112,6 +112,11 @@ class Signals(QWidget):
     def read_now(self) -> None:
         """Let the next frame say also what is read: what stands beside it is said anew then."""
         self._frame = 0
+
+    def show_tools(self, on: bool) -> None:
+        """Show what arranges plots, above and beside them; without, plots have its room."""
+        for part in (self.tools, self._left):
+            part.setVisible(on)
 
     @property
     def cards(self) -> Sequence[AnyPlot]:
@@ -205,7 +210,7 @@ class Signals(QWidget):
         everything.setContentsMargins(MARGIN, MARGIN, MARGIN, 0)
         everything.addWidget(self.tools)
         everything.addWidget(splitter, 1)
-        left, right = QWidget(splitter), QWidget(splitter)
+        left, right = self._left, _ = QWidget(splitter), QWidget(splitter)
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
         left_box.setContentsMargins(0, 0, 0, 8)
         right_box.setContentsMargins(0, 0, 0, 8)
@@ -373,7 +378,7 @@ class Signals(QWidget):
     def _say_more(self) -> None:
         scene = self.scene
         set_text(self.beside_said, scene.beside_text())
-        self.beside_said.setVisible(scene.beside is not None)
+        self.beside_said.setVisible(bool(self.beside_said.text()))
         self.trigger.say(scene.trigger_text() or "off: live data is shown")
 
     # --- what happened
@@ -458,13 +463,10 @@ class Signals(QWidget):
         a, b = (row_at(times, cursor) for cursor in self._at)
         first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
         rows = [
-            (
-                self.scene.meaning(text).name,
-                plot.unit,
-                measure(self.scene.values(text, len(times)), a, b, int(first), int(last)),
-            )
+            (name, plot.unit, measure(values, a, b, int(first), int(last)))
             for plot in self.plots
             for text in plot.drawn
+            for name, values in columns(self.scene, text, self.scene.times(self._seconds))
         ]
         a_s, b_s = self._at
         a_s, b_s = (a_s if a is None else float(times[a])), (b_s if b is None else float(times[b]))

@@ -1,10 +1,11 @@
-"""The plots of a workspace below each other, and all by which curves come into them and out."""
+"""The plots of a workspace, below each other or in two columns; how curves come into them and out."""
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
-from PySide6.QtCore import QPoint, Qt, Signal
-from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent, QDropEvent
-from PySide6.QtWidgets import QFrame, QMenu, QVBoxLayout
+from PySide6.QtCore import QPoint, QRect, Qt, Signal
+from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent, QDropEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QMenu
 
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.workspace import Refused
@@ -15,6 +16,9 @@ from server_gui.views.workspace.curve_menus import channel_menu, plot_menu
 from server_gui.views.workspace.drawing import AnyPlot
 from server_gui.views.workspace.unit_plot import Drawn, EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
+
+TWO: Final = 600  # wide at least, at text of 100 %: two columns
+COLUMNS: Final = 2
 
 
 class PlotArea(QFrame):
@@ -36,15 +40,16 @@ class PlotArea(QFrame):
         self.empty.setWordWrap(True)
         self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.empty.setObjectName("dim")
-        self._stack = QVBoxLayout(self)
-        self._stack.setContentsMargins(0, 0, 0, 0)
-        self._stack.addWidget(self.empty)
+        self.is_paired = False  # in two columns where there is room: left and right beside each other
+        self._columns = 1
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.addWidget(self.empty, 0, 0, 1, COLUMNS)
         self.below = PlainLabel("Drop it here for a plot of its own")
         self.below.setObjectName("banner")
         self.below.setProperty("tone", "plain")
         self.below.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.below.hide()
-        self._stack.addWidget(self.below)
         self.setAcceptDrops(True)
 
     def offer_below(self, wanted: bool) -> None:
@@ -54,12 +59,11 @@ class PlotArea(QFrame):
     def build(self, seconds: float, window: tuple[float, float] | None) -> None:
         """Make a card for each plot, of the last `seconds`, of which the `window` is in sight."""
         for card in self.cards:
-            self._stack.removeWidget(card)
+            self._grid.removeWidget(card)
             card.hide()
             card.deleteLater()
         self.cards = [self._card(place, seconds) for place in range(len(self._scene.workspace.plots))]
         for place, card in enumerate(self.cards):
-            self._stack.insertWidget(place, card, 1)
             self._bind(card, place)
             if isinstance(card, UnitPlot):
                 for signal, mine in (
@@ -71,8 +75,39 @@ class PlotArea(QFrame):
                     signal.connect(mine)
                 if window is not None and window[0] >= -seconds:
                     card.plot.show_window(*window)
+        self._place()
         self.built = self._scene.workspace.revision
         self.empty.setVisible(not self.cards)
+
+    def pair(self, on: bool) -> None:
+        """Place plots in two columns where there is room, or below each other."""
+        self.is_paired = on
+        self._place()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._fitting != self._columns:
+            self._place()
+
+    @property
+    def _fitting(self) -> int:
+        is_wide = self.is_paired and len(self.cards) > 1 and self.width() >= self._theme.px(TWO)
+        return COLUMNS if is_wide else 1
+
+    def _place(self) -> None:
+        """Place every card; the last of an odd number is as wide as two."""
+        self._columns, grid = self._fitting, self._grid
+        for row in range(grid.rowCount()):
+            grid.setRowStretch(row, 0)
+        wide = COLUMNS // self._columns
+        for place, card in enumerate(self.cards):
+            row, column = divmod(place, self._columns)
+            is_last_alone = place + 1 == len(self.cards) and column == 0
+            grid.addWidget(card, row, column * wide, 1, COLUMNS if is_last_alone else wide)
+            grid.setRowStretch(row, 1)
+        for column in range(COLUMNS):
+            grid.setColumnStretch(column, 1)
+        grid.addWidget(self.below, len(self.cards) + 1, 0, 1, COLUMNS)
 
     def _bind(self, card: AnyPlot, place: int) -> None:
         card.taken.connect(lambda texts: self._drop(texts, place))
@@ -88,8 +123,7 @@ class PlotArea(QFrame):
             return EmptyPlot(self._theme, place, [*lacks, *(one for one in curves if one.problem)])
         if x is not None and x.unit is not None:
             return XYPlot(self._theme, place, Drawn(x.text, x.name), (x.unit, unit), curves)
-        beside = "" if scene.beside is None else scene.beside.station.title
-        return UnitPlot(self._theme, place, unit, curves, seconds, beside)
+        return UnitPlot(self._theme, place, unit, curves, seconds, scene.names)
 
     # --- curves
 
@@ -134,11 +168,18 @@ class PlotArea(QFrame):
 
     def dropEvent(self, event: QDropEvent) -> None:
         event.acceptProposedAction()
-        scene, texts, y = self._scene, dropped(event.mimeData()), event.position().y()
-        place = sum(card.geometry().center().y() < y for card in self.cards)
+        scene, texts, at = self._scene, dropped(event.mimeData()), event.position().toPoint()
+        place = sum(_is_before(card.geometry(), at, self._columns) for card in self.cards)
 
         def all_of_them() -> None:
             for number, text in enumerate(texts):
                 scene.workspace.new_plot(scene.meaning(text), place=place + number)
 
         self.do(all_of_them)
+
+
+def _is_before(card: QRect, at: QPoint, columns: int) -> bool:
+    """Return whether a card is read before a place."""
+    if columns == 1:
+        return card.center().y() < at.y()
+    return card.bottom() < at.y() or (card.top() <= at.y() and card.center().x() < at.x())

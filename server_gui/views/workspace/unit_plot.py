@@ -17,7 +17,8 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 # Of what is neither the first left nor the first right channel of its plot.
 OTHERS: Final = ("green", "pink", "vermilion", "yellow", "violet", "lime")
-BESIDE: Final = "┅"
+HERE, BESIDE = "━", "─"  # as thick as the curves are
+RECORDINGS: Final = ("green", "pink")  # where a plot has one channel of two: colours that belong to no side
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +55,22 @@ def takes_no_drops(plot: Plot) -> Plot:
 
 
 class UnitPlot(TakesCurves):
-    """One plot. Of what is `beside`, each curve is drawn dashed; `menu` is filled by whoever shows it."""
+    """One plot; `menu` is filled by whoever shows it.
+
+    With `names`, of what is looked at and of what is beside it, each curve is there twice: what is beside is
+    thin, and of another colour.
+    """
 
     def __init__(
-        self, theme: Theme, place: int, unit: Unit, curves: Sequence[Drawn], seconds: float, beside: str = ""
+        self,
+        theme: Theme,
+        place: int,
+        unit: Unit,
+        curves: Sequence[Drawn],
+        seconds: float,
+        names: tuple[str, str] | None = None,
     ) -> None:
-        super().__init__(_title(place, unit, curves))
+        super().__init__(_title(place, unit, curves, of_two=names is not None))
         self.unit = unit
         self.curves = tuple(curves)
         self.channels = tuple(curve.text for curve in curves)
@@ -67,12 +78,11 @@ class UnitPlot(TakesCurves):
         self.menu = QMenu(self)
         self.plot = takes_no_drops(Plot(theme, seconds, least=1e-3, mouse=Mouse.ALL))
         self._theme = theme
-        self._beside = beside
-        colours = dict(zip(self.channels, colours_of(self.channels), strict=True))
-        self._curves = [Curve(text, colours[text]) for text in self.drawn]
-        self.plot.set_curves(
-            [*self._curves, *(Curve(one.channel, one.colour, dashed=True) for one in self._curves if beside)]
-        )
+        self._both = names or ("", "")
+        here, beside = _colours(self.channels, of_two=names is not None)
+        self._curves = [Curve(text, here[text]) for text in self.drawn]
+        self._beside = [Curve(text, beside[text], thin=True) for text in self.drawn] if names else []
+        self.plot.set_curves([*self._curves, *self._beside])
         self.plot.setAccessibleName(self.accessibleName())
         self._places = unit.digits
         self._names = {curve.text: curve.name for curve in curves}
@@ -87,21 +97,43 @@ class UnitPlot(TakesCurves):
         theirs: Sequence[float | None] = (),
         *,
         live: bool = True,
-        when: str = "",
+        notes: Sequence[str] = ("",),
     ) -> None:
-        """Show a value of each curve behind its name, `theirs` of what is beside; `when` tells the time."""
+        """Show a value of each curve behind its name, `theirs` of what is beside.
+
+        `notes` stand at the title, the fullest wording first.
+        """
         self._places = places(self.unit.digits, self.plot.range_shown, self._places)
         told = []
         for number, (curve, value) in enumerate(zip(self._curves, values, strict=True)):
-            ink = css(self._theme, curve.colour if live else "old")
-            told.append((ink, "━", f"{self._names[curve.channel]} {self._text(value)}"))
+            name = "" if theirs and len(self._curves) == 1 else self._names[curve.channel]
+            said = " ".join(filter(None, (name, self._both[0], self._text(value))))
+            told.append((self._ink(curve, live=live), HERE, said))
             if theirs:
-                told.append((ink, BESIDE, self._text(theirs[number])))
+                told += self._compared(value, theirs[number], self._beside[number], live=live)
         bad = css(self._theme, "bad")
         told += [(bad, "▲", f"{one.name}: {one.problem}") for one in self.curves if one.problem]
         self._legend.say(told)
-        self.set_note(when)
+        self.set_note(*notes)
         self.plot.setAccessibleDescription(self._legend.accessibleDescription())
+
+    def _compared(
+        self, value: float | None, other: float | None, curve: Curve, *, live: bool
+    ) -> list[tuple[str, str, str]]:
+        """Return the value of what is beside, and how much more that is."""
+        more = None if value is None or other is None else other - value
+        said = "–" if more is None else rounded(more * self.unit.scale, self._places, "+")
+        return [
+            (self._ink(curve, live=live), BESIDE, f"{self._both[1]} {self._text(other)}"),
+            (
+                css(self._theme, "text" if live else "old"),
+                "",
+                f"difference {said} {self.unit.symbol}".rstrip(),
+            ),
+        ]
+
+    def _ink(self, curve: Curve, *, live: bool) -> str:
+        return css(self._theme, curve.colour if live else "old")
 
     def _text(self, value: float | None) -> str:
         return "–" if value is None else rounded(value * self.unit.scale, self._places)
@@ -120,9 +152,16 @@ class EmptyPlot(TakesCurves):
         self.body.addWidget(QWidget(), 1)
 
 
-def _title(place: int, unit: Unit, curves: Sequence[Drawn]) -> str:
-    """Return the measured quantities with their unit: a unit alone says too little."""
-    quantities = dict.fromkeys(_quantity(curve) for curve in curves if not curve.problem)
+def _title(place: int, unit: Unit, curves: Sequence[Drawn], *, of_two: bool) -> str:
+    """Return the measured quantities with their unit: a unit alone says too little.
+
+    One channel of two robots or recordings is named here, so that their names have room below.
+    """
+    drawn = [curve for curve in curves if not curve.problem]
+    if of_two and len(drawn) == 1:
+        quantities = [drawn[0].name.replace(".", " ").replace("_", " ")]
+    else:
+        quantities = [*dict.fromkeys(map(_quantity, drawn))]
     said = ", ".join(quantities).capitalize()
     return f"{place + 1} · {said} ({unit.symbol})" if unit.symbol else f"{place + 1} · {said}"
 
@@ -130,6 +169,17 @@ def _title(place: int, unit: Unit, curves: Sequence[Drawn]) -> str:
 def _quantity(curve: Drawn) -> str:
     is_channel = curve.text == curve.name and " " not in curve.name
     return curve.name.rpartition(".")[2].replace("_", " ") if is_channel else curve.name
+
+
+def _colours(channels: Sequence[str], *, of_two: bool) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the colours of the channels, and those of the same channels of what is beside."""
+    if of_two and len(channels) == 1:
+        here, beside = ([one] for one in RECORDINGS)
+    else:
+        here = colours_of(channels)
+        free = [one for one in OTHERS if one not in here] or OTHERS
+        beside = [free[place % len(free)] for place in range(len(channels))]
+    return dict(zip(channels, here, strict=True)), dict(zip(channels, beside, strict=True))
 
 
 def colours_of(channels: Sequence[str]) -> list[str]:

@@ -1,10 +1,13 @@
 """What has happened is found in rows, in the journal and among a recording's events, once each."""
 
 import datetime
+from types import SimpleNamespace
+from typing import cast
 
 import msgspec
 
 from drivers.error_codes import error_text
+from gateway.wire.bus import BusInfo, NodeInfo
 from server_gui.core.desk.flags import (
     Flag,
     FlagKind,
@@ -15,7 +18,10 @@ from server_gui.core.desk.flags import (
     of_recorded_journal,
 )
 from server_gui.core.desk.recording import By, Recording
-from server_gui.core.follow.events import Described
+from server_gui.core.fleet.robot_recording import RobotRecording
+from server_gui.core.follow.events import BusesSeen, Described
+from server_gui.core.recording.batching import EventKind
+from server_gui.core.recording.recorder import Recorder
 from tests.support.desk import Bench, described, telemetry
 
 WORDS = {
@@ -23,6 +29,7 @@ WORDS = {
     for name in ("left_knee.state", "right_knee.state", "right_hip.state")
 }
 MS = 1_000_000
+BUS = BusInfo("can0", "error active", 1_000_000, 40.0, 1000.0, 0, 0, 1, 0, [])
 
 
 def entry(what: str, at_ns: int, boot_id: str = "b", **more: object) -> dict[str, object]:
@@ -151,3 +158,44 @@ def test_a_station_flags_what_its_rows_tell_and_what_is_marked(bench: Bench) -> 
     other = described().description
     station.take([Described(msgspec.structs.replace(other, boot_id="another"))])
     assert len(station.flags) == 0, "its clock has begun anew"
+
+
+def test_a_bus_in_trouble_is_flagged_where_it_began_once_and_again_where_it_becomes_worse(
+    bench: Bench,
+) -> None:
+    bench.station.take([described(), telemetry([1_000, 2_000], {"left_knee.position": [0.0, 0.1]})])
+
+    def see(at_s: float, **now: object) -> None:
+        bus = msgspec.structs.replace(BUS, **now)
+        bench.station.take([BusesSeen((bus,), round(at_s * 1e9))])
+
+    def told() -> list[Flag]:
+        return [flag for flag in bench.station.flags if flag.kind is FlagKind.BUS]
+
+    see(1.0)
+    see(2.0, load_percent=85.0)
+    assert told() == [], "busy is no trouble yet"
+    see(3.0, load_percent=99.0)
+    see(4.0, load_percent=90.0)
+    see(5.0, load_percent=99.0)
+    assert told() == [Flag(2_000, "can0: it is full: 99 % of its time is taken", FlagKind.BUS)]
+    bench.station.take([telemetry([3_000], {"left_knee.position": [0.2]})])
+    see(6.0, state="bus off")
+    assert [(flag.at_ns, flag.text) for flag in told()[1:]] == [(3_000, "can0: bus off")]
+    node = NodeInfo(3, ["left_knee"], 0.4, 1.0, 1, 0, 0, 8.0)
+    see(40.0)
+    see(41.0, nodes=[node])
+    assert told()[-1].text == "can0: left knee: 8 % of its PDOs are missing"
+
+
+def test_the_trouble_of_a_bus_is_recorded_and_flagged_in_the_replay() -> None:
+    said: list[tuple[object, ...]] = []
+    keeping = RobotRecording(
+        "exo-01", cast("Recorder", SimpleNamespace(event=lambda *told: said.append(told)))
+    )
+    for at_s, state in ((1, "error active"), (2, "bus off"), (3, "bus off")):
+        keeping.take(BusesSeen((msgspec.structs.replace(BUS, state=state),), at_s * 10**9))
+    assert said == [("exo-01", EventKind.BUS, "can0: bus off")]
+    utc = datetime.datetime(2026, 11, 28, tzinfo=datetime.UTC)
+    (flag,) = of_events([{"kind": EventKind.BUS.value, "utc": utc, "text": "can0: bus off"}])
+    assert (flag.kind, flag.text) == (FlagKind.BUS, "can0: bus off")
