@@ -5,7 +5,17 @@ from PySide6.QtWidgets import QScrollArea
 
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.page import Overview
-from server_gui.views.overview.sections import ALL, JOINTS, PLOTS, WEARER, Page, Section, arranged, name_of
+from server_gui.views.overview.sections import (
+    ALL,
+    JOINTS,
+    PICTURES_FIRST,
+    PLOTS,
+    WEARER,
+    Page,
+    Section,
+    arranged,
+    name_of,
+)
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Bench
@@ -45,6 +55,13 @@ def test_sections_that_have_room_together_are_on_one_page(room: int, pages: tupl
     assert frozenset.union(*pages) == ALL[0], "each is on some page"
     names = [name_of(page, pages) for page in pages]
     assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("room", "pages"), [(500, ALL), (340, (WEARER | PLOTS, JOINTS)), (240, (PLOTS, WEARER, JOINTS))]
+)
+def test_a_replay_begins_with_how_the_walk_looked(room: int, pages: tuple[Page, ...]) -> None:
+    assert arranged(NEEDS, room, bar=22, between=5, offered=PICTURES_FIRST) == pages
 
 
 def test_a_small_laptop_shows_all_of_the_overview_with_curves_that_can_be_read(

@@ -24,7 +24,15 @@ from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
-from server_gui.views.overview.sections import ALL, Page, Section, SectionBar, arranged
+from server_gui.views.overview.sections import (
+    ALL,
+    NUMBERS_FIRST,
+    PICTURES_FIRST,
+    Page,
+    Section,
+    SectionBar,
+    arranged,
+)
 from server_gui.views.overview.sections import PLOTS as PLOTS_ALONE
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases, step_phases
 from server_gui.views.refresh_rate import READ_NS
@@ -162,11 +170,12 @@ class Overview(QWidget):
     def _fitting_pages(self) -> tuple[Page, ...]:
         """Return the pages on which everything is whole."""
         seen = self.parentWidget()
-        if seen is None or not self.is_numbers_first:
+        if seen is None:
             return ALL
+        offered = NUMBERS_FIRST if self.is_numbers_first else PICTURES_FIRST
         gain = self.now.gain if self._columns > 1 else 0
         bar, between = self.sections.sizeHint().height() - gain, self._grid.verticalSpacing()
-        return arranged(self._needs(), seen.height() - self._around, bar, between)
+        return arranged(self._needs(), seen.height() - self._around, bar, between, offered)
 
     @property
     def _around(self) -> int:

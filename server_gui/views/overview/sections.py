@@ -23,23 +23,26 @@ class Section(Enum):
 Page = frozenset[Section]
 JOINTS, WEARER, PLOTS = (frozenset({section}) for section in Section)
 ALL: Final[tuple[Page, ...]] = (JOINTS | WEARER | PLOTS,)
-# The first arrangement that fits is taken; the last whatever room there is.
-ARRANGEMENTS: Final[tuple[tuple[Page, ...], ...]] = (
+Arrangements = tuple[tuple[Page, ...], ...]  # the first that fits is taken; the last whatever room there is
+NUMBERS_FIRST: Final[Arrangements] = (
     ALL,
     (JOINTS | WEARER, JOINTS | PLOTS),
     (JOINTS, WEARER | PLOTS),
     (JOINTS, WEARER, PLOTS),
 )
+PICTURES_FIRST: Final[Arrangements] = (ALL, (WEARER | PLOTS, JOINTS), (PLOTS, WEARER, JOINTS))
 HINT: Final = "Not all of the overview has room at once. Larger window, smaller text or F9: more of it"
 
 
-def arranged(needs: Mapping[Section, int], room: int, bar: int, between: int) -> tuple[Page, ...]:
+def arranged(
+    needs: Mapping[Section, int], room: int, bar: int, between: int, offered: Arrangements = NUMBERS_FIRST
+) -> tuple[Page, ...]:
     """Return the pages for so much `room`, of which the `bar` that chooses one takes some (pixels)."""
-    for pages in ARRANGEMENTS:
+    for pages in offered:
         left = room - (bar + between if len(pages) > 1 else 0)
         if all(sum(needs[one] + between for one in page) <= left for page in pages):
             return pages
-    return ARRANGEMENTS[-1]
+    return offered[-1]
 
 
 def name_of(page: Page, pages: Sequence[Page]) -> str:

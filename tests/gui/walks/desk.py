@@ -155,6 +155,7 @@ def side_by_side(bench: Bench) -> None:
     hand.xdotool("mousemove", str(x), str(y), "keydown", "ctrl", "click", "1", "keyup", "ctrl")
     hand.insist("Side by side", lambda: hand.reads("aligned by"), exactly=True)
     hand.sees("aligned by", within_s=AGAIN_S)
+    hand.sees("difference", "°", within_s=AGAIN_S)  # both have come into the plots
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("side-by-side")
     hand.click("Close the second recording")
