@@ -17,7 +17,8 @@ from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.newest_predictions import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import EventSource, Leg
-from server_gui.views.marks import Mark, enabled_text
+from server_gui.core.tuning.stop import is_off
+from server_gui.views.marks import Mark, age_text, enabled_text, state_mark
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
@@ -44,6 +45,7 @@ UNDRIVEN: Final = {  # what of such a robot is said where there is little room, 
 }
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
+AS_KNOWN: Final = "as far as is known"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 UNSEEN: Final = "not judged"  # for the model does not see all
@@ -153,6 +155,9 @@ def by_steps(station: Station) -> PredictionRow:
 def doing(station: Station) -> tuple[str, ...]:
     """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
+    if not station.is_live and is_last_held(station):
+        word = "STOPPED" if station.is_linked else f"STOPPED, {AS_KNOWN}"
+        return f"{word} · {no_data(station)}", f"STOPPED · {no_data(station)}", no_data(station)
     if not station.is_live:
         return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
@@ -163,6 +168,22 @@ def doing(station: Station) -> tuple[str, ...]:
     least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
     fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
     return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count, fewest)))
+
+
+def is_last_held(station: Station) -> bool:
+    """Return whether a stop was held, and every drive off, by what has come last: nothing may have since."""
+    robot = station.robot
+    words = [robot.word(f"{joint}.state") for joint in robot.names("joint")]
+    is_held = station.stopping.held and not station.stopping.is_unproven
+    return (
+        is_held and bool(words) and all(is_off(word) and state_mark(word).colour == "dim" for word in words)
+    )
+
+
+def no_data(station: Station) -> str:
+    """Return for how long nothing has come."""
+    age_s = station.robot.age_s()
+    return "no data" if age_s is None else f"no data for {f'{age_s:.1f} s' if age_s < 1 else age_text(age_s)}"
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:
