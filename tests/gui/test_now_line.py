@@ -127,7 +127,7 @@ def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, ben
     overview.read_now()
     overview.refresh()
     drives = overview.now.drives
-    assert (drives.main.text(), drives._icon._mark.colour) == ("STOP NOT CONFIRMED", "bad")
+    assert (drives.main.text(), drives._icon._mark.colour) == ("STILL MOVING: STOP again", "bad")
     assert drives.detail.text() == "operation enabled · 6 of 6 enabled"
 
 

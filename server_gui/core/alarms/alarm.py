@@ -36,6 +36,7 @@ class Alarm:
     node: str = ""  # the bus of what is a node
     under: "tuple[Alarm, ...]" = ()  # what it explains
     aside: str = ""  # said only where there is room for all
+    why: str = ""  # more of the cause, below the line: what is to be done stands in it
 
     @property
     def key(self) -> tuple[Kind, str]:

@@ -13,6 +13,7 @@ __all__ = ["TEXTS", "Kind", "Text", "check_of", "error_check", "error_text"]
 class Kind(Enum):
     """What sort of thing is wrong; the worst comes first."""
 
+    STILL_MOVING = "STILL MOVING"  # after a STOP that is not confirmed
     NOT_STOPPED = "STOP NOT CONFIRMED"
     ANOTHER = "ANOTHER ROBOT ANSWERS"
     NEVER_REACHED = "never reached"
@@ -41,6 +42,9 @@ class Kind(Enum):
     RESET = "stop reset"
 
 
+UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.NOT_STOPPED})
+
+
 @dataclass(frozen=True, slots=True)
 class Text:
     """How a kind is marked, and what to check where nothing better is known."""
@@ -60,6 +64,7 @@ _START_SIMULATED: Final = f"{_START} (Start walking, or gwrms sim-fault --dir DI
 RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
+        _text(Kind.STILL_MOVING, "square", "bad", "STOP again, or use the hardware stop"),
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
         _text(
             Kind.ANOTHER,

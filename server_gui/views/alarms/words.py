@@ -100,10 +100,15 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
     alarm = one.alarm
     first = f"{SINCE}{time_of_day(one.since_s)}, for {lasting(max(0.0, now_s - one.since_s))}"
+    first = f"{first} · {alarm.why}" if alarm.why else first
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
-    return [*lines, f"{REMEDY} {in_window(alarm.check)}"] if alarm.check else lines
+    return (
+        [*lines, f"{REMEDY} {in_window(alarm.check)}"]
+        if alarm.check and alarm.check not in alarm.what
+        else lines
+    )
 
 
 def blames(alarm: Alarm) -> bool:

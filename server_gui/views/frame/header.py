@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
-from server_gui.core.alarms.robot_alarms import remedy
-from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.texts import TEXTS
+from server_gui.core.alarms.unconfirmed import remedy, unconfirmed
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
@@ -25,7 +25,6 @@ from server_gui.views.widgets.stop_button import StopButton
 STOP_MARKS: Final = {
     StopState.SENT: Mark("half", "warn", "sent"),
     StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
-    StopState.NOT_CONFIRMED: TEXTS[Kind.NOT_STOPPED].mark,
 }
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
@@ -212,8 +211,11 @@ def _outcome(station: Station) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (stopping.timed(counted(stopping.drives, "drive")),),
-        StopState.NOT_CONFIRMED: remedy(station.robot),
+        StopState.NOT_CONFIRMED: remedy(station.robot, stopping),
     }
+    if stopping.is_unproven:
+        mark = TEXTS[unconfirmed(station.robot)].mark
+        return Words(mark, mark.word, parts[stopping.state], tip)
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
 

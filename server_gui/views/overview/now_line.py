@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPus
 
 from gateway.units import Units, rounded
 from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.unconfirmed import STOP_AGAIN, unconfirmed
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
@@ -203,8 +204,9 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
     count = enabled_text(station.robot, live=station.is_live)
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
-        led = TEXTS[Kind.NOT_STOPPED].mark
-        return led, (led.word,), (f"{known} · {count}", count)
+        led = TEXTS[unconfirmed(station.robot)].mark
+        words = (f"{led.word}: {STOP_AGAIN}",) if led.word == Kind.STILL_MOVING.value else ()
+        return led, (*words, led.word), (f"{known} · {count}", count)
     if not station.is_live and not is_last_held(station):
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
     if not station.is_live:

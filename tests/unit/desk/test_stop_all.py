@@ -81,7 +81,7 @@ def test_where_nothing_is_known_of_any_drive_none_is_counted(two: Bench) -> None
     two.commands[1].fail(NotConnected("no gateway there; is it running?"))
     two.desk.stations[0].reset()
     two.commands[0].answer(OFF)
-    assert said(two).startswith("STOP ALL: 0 of 2 robots stopped; exo-01 reset; exo-02 STOP NOT CONFIRMED")
+    assert said(two).startswith("STOP ALL: 0 of 2 robots stopped; exo-01 reset; exo-02 STILL MOVING")
     assert two.desk.stations[1].stopping.text.endswith("is it running? Use the hardware stop")
 
 
@@ -90,7 +90,7 @@ def test_one_drive_that_does_not_confirm_is_named_with_its_robot(two: Bench) -> 
     two.commands[0].answer(ALL)
     two.commands[1].answer(Stopped({**ALL.drives, "left_knee": "unreachable"}, held=True))
     assert "11/12 drives confirmed in" in said(two)
-    assert "exo-02 STOP NOT CONFIRMED: left knee unreachable" in said(two)
+    assert "exo-02 STILL MOVING: left knee unreachable → STOP again" in said(two)
 
 
 def test_the_result_stays_until_the_last_robot_is_reset_or_removed(two: Bench) -> None:
