@@ -45,6 +45,7 @@ UNDRIVEN: Final = {  # what of such a robot is said where there is little room, 
 }
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
+NOT_YET: Final = "its activity is not known yet"
 AS_KNOWN: Final = "as far as is known"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
@@ -193,6 +194,8 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         shown = None if stopped and task == GAIT_PHASE else predictions.told.get(task)
         if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
             line = said(shown, stopped=stopped, unseen=blind(station))
+            if task == FALLING and line.mark.colour == "accent" and (why := _unseen(station)):
+                line = PredictionRow(Mark("ring", "old", UNSEEN), UNSEEN, why, why, line.tip)
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
             if not station.is_live and line.mark.colour != "bad":
@@ -215,6 +218,13 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         yield PredictionRow(mark, f"{name}: {mark.word}", " · ".join(filter(None, (why, by))), by, why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
         yield _learning(adapting)
+
+
+def _unseen(station: Station) -> str:
+    """Return why a good balance is not believed: what a model needs is not there, or too little was seen."""
+    if missing := blind(station):
+        return missing
+    return NOT_YET if station.is_live and activity(station).mark.word == "not known" else ""
 
 
 def _steps_by(station: Station, part: str) -> str:

@@ -453,8 +453,12 @@ def test_of_much_to_check_the_first_thing_is_kept_where_not_all_of_it_has_room()
     said = ["since 07:28:21, for 4 s · robot: it walks", "→ check its power; check its encoder"]
     shorter = fewer(said)
     assert shorter[0] == " · ".join(said)
-    assert shorter[-4:] == (
+    assert shorter[-8:] == (
+        "since 07:28:21, for 4 s · → check its power; check its …",
+        "since 07:28:21, for 4 s · → check its power; check …",
         "since 07:28:21, for 4 s · → check its power …",
+        "→ check its power; check its …",
+        "→ check its power; check …",
         "→ check its power …",
         "since 07:28:21, for 4 s",
         "",

@@ -170,6 +170,8 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         since_s = now_s if alarm.since_s is None else alarm.since_s
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)
         return Active(alarm, since_s, at_ns)
+    if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
+        return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
     return dataclasses.replace(before, alarm=alarm)
 
 

@@ -77,7 +77,8 @@ class Facts:
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
-    return load_first(without_wires(_found(facts), facts.robot), first, len(facts.robot.parts))
+    told = without_wires(_found(facts), facts.robot)
+    return load_first(told, first, len(facts.robot.parts), wired=not is_simulated(facts.robot))
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
@@ -123,7 +124,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
 
 def go_on(kind: Kind, robot: Robot) -> str:
     """Return how to go on after a stop, as the robot's gateway may."""
-    return check_of(kind, role=role_of(robot), simulated=is_simulated(robot))
+    return check_of(kind, role=role_of(robot), start_by=robot.start_by)
 
 
 def role_of(robot: Robot) -> str | None:

@@ -60,7 +60,6 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 _ENABLE: Final = "enable the drives (gwrms enable, or the robot's controller)"
 # Where only the controller may: the gateway is an observer.
 _START: Final = "enable the drives: start the robot's controller again"
-_START_SIMULATED: Final = f"{_START} (Start walking, or gwrms sim-fault --dir DIR --controller start)"
 RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
@@ -174,10 +173,14 @@ _CHECKS: Final = {
 }
 
 
-def check_of(kind: Kind, component: str = "", role: str | None = None, *, simulated: bool = False) -> str:
+def check_of(kind: Kind, component: str = "", role: str | None = None, *, start_by: str = "") -> str:
     """Return what to check, by the kind of component too, and by the gateway's role on the bus.
 
-    What only a simulator can do is said only of a `simulated` robot.
+    `start_by` is what starts the controller of this very robot, where that is known: of our simulator.
     """
     check = _CHECKS.get((kind, component), TEXTS[kind].check)
-    return check.replace(_ENABLE, _START_SIMULATED if simulated else _START) if role == "observer" else check
+    return (
+        check.replace(_ENABLE, f"{_START} ({start_by})" if start_by else _START)
+        if role == "observer"
+        else check
+    )

@@ -125,7 +125,7 @@ def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts for less and less room: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
     bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
-    first = [f"{begins}{MORE}" for one in check if (begins := BREAK.split(one, maxsplit=1)[0]) != one]
+    first = [f"{begun}{MORE}" for one in check for begun in _begun(one)]
     with_check = (
         said,
         [since, *said[1:]],
@@ -133,10 +133,17 @@ def fewer(said: list[str]) -> tuple[str, ...]:
         [since, *bare],
         check,
         bare,
-        [since, *first] if first else [],
+        *([since, one] for one in first),
     )
-    shorter: tuple[list[str], ...] = (*with_check, first, [since], [])
+    shorter: tuple[list[str], ...] = (*with_check, *([one] for one in first), [since], [])
     return tuple(dict.fromkeys(map(" · ".join, shorter)))
+
+
+def _begun(check: str) -> list[str]:
+    """Return what begins it, a word less each, down to its first clause: no room stays empty."""
+    least, words = BREAK.split(check, maxsplit=1)[0], check.split(" ")
+    begun = (" ".join(words[:count]).rstrip(",;") for count in range(len(words) - 1, 0, -1))
+    return [one for one in dict.fromkeys(begun) if len(one) >= len(least)]
 
 
 def lasting(for_s: float) -> str:

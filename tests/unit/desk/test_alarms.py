@@ -525,3 +525,19 @@ def test_devices_that_a_gateway_begins_to_read_are_one_alarm_and_not_lost(bench:
     assert one.alarm.line == "no data yet: devices: not read yet: left hip, left knee"
     assert bench.station.mark.colour == "old"
     assert not [item for item in bench.station.news.items if item.kind is NewsKind.LOST]
+
+
+def test_data_that_comes_in_bursts_are_silent_since_the_newest_row(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said for 34 s while the newest row was 3 s old."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 0)
+    found = []
+    for _ in range(2):
+        bench.station.take([walking(2)])
+        (one,) = (one for one in bench.station.alarms.active if one.alarm.kind is Kind.STALE)
+        found.append(one)
+        assert bench.station.robot.now_s() - one.since_s == pytest.approx(
+            bench.station.robot.age_s() or 0.0, abs=0.05
+        )
+    assert found[1].since_s > found[0].since_s
