@@ -42,6 +42,7 @@ _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
+_MISSING: Final = re.compile(r"(?<=heartbeat has been missing for )(?=\d)")  # it is so still, and longer
 _ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
 _ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
@@ -219,7 +220,8 @@ def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
 def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> Iterator[Alarm]:
     if robot.is_recording:
         return
-    where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
+    problem = _MISSING.sub("more than ", _LASTING.sub("", part.problem or ""))
+    where = _where(robot, part.name)
     kind = _KINDS.get(part.state)
     channel = _channel(robot, part.name, None)
     is_now = not robot.is_stale()

@@ -22,6 +22,7 @@ class FlagKind(Enum):
     """What sort of thing happened; the word is shown."""
 
     STOP = "stop"
+    UNPROVEN = "stop not confirmed"  # that this window has sent
     FAULT = "fault"
     WRITE = "write"
     TRIAL = "trial"

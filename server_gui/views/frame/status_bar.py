@@ -23,6 +23,8 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 FRAMES: Final = 60
+LEAST_FRAMES: Final = 5  # before which nothing is said of the rate: a window that opens is slow
+SLOW_FPS: Final = 8.0  # below which this computer is busy, whatever else it does
 FRAMES_HINT: Final = (
     "Frames that this window draws a second; while this computer is busy, what is shown is late"
 )
@@ -77,10 +79,11 @@ class StatusBar(QStatusBar):
         self.bus.say(*words)
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
-        is_full = station is not None and station.is_full()
-        rate = f"{self._rate():.0f} fps"
-        self._window.say(*((*(f"{busy} · {rate}" for busy in FULL), rate) if is_full else (rate,)))
-        set_tone(self._window, "warn" if is_full else "")
+        known, is_full = self._rate(), station is not None and station.is_full()
+        is_busy = is_full or (known is not None and known < SLOW_FPS)
+        rate = "– fps" if known is None else f"{known:.0f} fps" if known >= 1.0 else "<1 fps"
+        self._window.say(*(*(f"{busy} · {rate}" for busy in FULL), FULL[-1]) if is_busy else (rate,))
+        set_tone(self._window, "warn" if is_busy else "")
         set_tip(self._window, FRAMES_HINT)
 
     def _refresh_recording(self, station: Station | None) -> None:
@@ -94,9 +97,10 @@ class StatusBar(QStatusBar):
         self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)
 
-    def _rate(self) -> float:
-        if len(self._frames) < 2:
-            return 0.0
+    def _rate(self) -> float | None:
+        """Return the frames a second of late; None while too few are known."""
+        if len(self._frames) < LEAST_FRAMES:
+            return None
         return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
 
 

@@ -235,7 +235,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
-        self.getPlotItem().getAxis("bottom").set_end(end if live else LAST)
+        if self.getPlotItem().getAxis("bottom").set_end(end if live else LAST):
+            self.viewport().update()  # with the curves: the scene alone would be drawn a frame later
         self._mark()
 
     def draw_anew(self) -> None:

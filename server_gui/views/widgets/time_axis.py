@@ -30,12 +30,14 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self.picture = None
         self.update()
 
-    def set_end(self, word: str) -> None:
-        """Set what its last place is called: `NOW`, `LAST`, `PAUSED` or `SHOWN`."""
-        if word != self._end:
+    def set_end(self, word: str) -> bool:
+        """Set what its last place is called: `NOW`, `LAST`, `PAUSED` or `SHOWN`; return whether it is new."""
+        is_new = word != self._end
+        if is_new:
             self._end = word
             self.picture = None
             self.update()
+        return is_new
 
     def boundingRect(self) -> QRectF:
         """With room for the words at its ends."""

@@ -541,3 +541,11 @@ def test_data_that_comes_in_bursts_are_silent_since_the_newest_row(
             bench.station.robot.age_s() or 0.0, abs=0.05
         )
     assert found[1].since_s > found[0].since_s
+
+
+def test_how_long_a_heartbeat_is_missing_is_what_it_was_at_least(bench: Bench) -> None:
+    """It said for 0.2 s beside for 2 s."""
+    problem = "its heartbeat has been missing for 0.2 s: check the node's power and cable"
+    bench.station.take([looked(state="stale", problem=problem)])
+    (one,) = bench.station.alarms.active
+    assert one.alarm.what == "its heartbeat has been missing for more than 0.2 s"

@@ -1,13 +1,16 @@
 """What has happened is found in rows, in the journal and among a recording's events, once each."""
 
 import datetime
+import time
 from types import SimpleNamespace
 from typing import cast
 
 import msgspec
 
 from drivers.error_codes import error_text
+from gateway.client import ConnectionState, NotConnected
 from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.wire.stop import Stopped
 from server_gui.core.desk.flags import (
     Flag,
     FlagKind,
@@ -19,10 +22,10 @@ from server_gui.core.desk.flags import (
 )
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.fleet.robot_recording import RobotRecording
-from server_gui.core.follow.events import BusesSeen, Described
+from server_gui.core.follow.events import BusesSeen, Described, LinkChanged
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
-from tests.support.desk import Bench, described, telemetry
+from tests.support.desk import JOINTS, Bench, described, telemetry, walking
 
 WORDS = {
     name: {"4": "operation enabled", "5": "quick stop active", "7": "fault"}
@@ -199,3 +202,18 @@ def test_the_trouble_of_a_bus_is_recorded_and_flagged_in_the_replay() -> None:
     utc = datetime.datetime(2026, 11, 28, tzinfo=datetime.UTC)
     (flag,) = of_events([{"kind": EventKind.BUS.value, "utc": utc, "text": "can0: bus off"}])
     assert (flag.kind, flag.text) == (FlagKind.BUS, "can0: bus off")
+
+
+def test_a_stop_that_is_not_confirmed_has_a_flag_also_where_no_data_came(bench: Bench) -> None:
+    station = bench.station
+    station.take([described(), walking(10)])
+    newest_ns = station.rings.newest_ns or 0
+    station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    station.stop("test")
+    bench.first.fail(NotConnected("nothing was sent; there is no link"))
+    (flag,) = (one for one in station.flags if one.kind is FlagKind.UNPROVEN)
+    assert flag.text == "STOP NOT CONFIRMED: nothing was sent; there is no link"
+    assert newest_ns < flag.at_ns < newest_ns + 5_000_000_000
+    station.stop("again")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    assert [one.kind for one in station.flags].count(FlagKind.UNPROVEN) == 1
