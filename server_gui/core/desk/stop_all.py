@@ -70,7 +70,10 @@ def _result(robots: Sequence[Stopped], left: Sequence[Stopped]) -> StopAllResult
 
 
 def _drives(robots: Sequence[Stopped], left: Sequence[Stopped]) -> str:
-    """Return `12/12 drives confirmed in 84 ms`: of the robots whose drives are known."""
+    """Return `12/12 drives confirmed in 84 ms`: of the robots whose drives are known.
+
+    Drives that were off before are counted apart: the time says nothing of them.
+    """
     if not any(one.stopping.state in (StopState.CONFIRMED, StopState.NOT_CONFIRMED) for one in left):
         return ""
     confirmed = sum(len(one.stopping.confirmed) for one in left)
@@ -81,6 +84,10 @@ def _drives(robots: Sequence[Stopped], left: Sequence[Stopped]) -> str:
     said = f"{confirmed}{every} {'drive' if one_drive else 'drives'} confirmed"
     if not confirmed:
         return said if every else ""
+    off = sum(len(one.stopping.already_off) for one in left)
+    if off and after_ms:
+        were = "was" if off == 1 else "were"
+        return f"{said}: {confirmed - off} stopped in {max(after_ms):.0f} ms, {off} {were} off before"
     return f"{said} in {max(after_ms):.0f} ms" if after_ms else f"{said}, already off"
 
 

@@ -300,6 +300,11 @@ class StopProgress:
         return max(1.0, *after_ms) if is_shown else self.answered_ms or 0.0
 
     @property
+    def already_off(self) -> frozenset[str]:
+        """The drives that have confirmed the latest STOP, and were off when it was sent."""
+        return self.confirmed & frozenset(self._off)
+
+    @property
     def confirmed(self) -> frozenset[str]:
         """The drives that have confirmed the latest STOP."""
         return frozenset(self._confirmed)
