@@ -62,10 +62,10 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     show(view, bench, BUS)
     assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
     assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
-    knee = ["2", "left knee", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
+    knee = ["2", "left knee", "", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
     assert row(view, 0) == knee, "nothing new comes from the robot"
-    assert row(view, 1)[:5] == ["–", "SYNC", "", "10 %", "100"]
-    assert row(view, 2)[:5] == ["–", "gateway or filtered", "", "1 %", "10"]
+    assert row(view, 1)[:6] == ["–", "SYNC", "", "", "10 %", "100"]
+    assert row(view, 2)[:6] == ["–", "gateway or filtered", "", "", "1 %", "10"]
     assert not view.said.isVisible()
 
 
@@ -169,7 +169,7 @@ def test_page_and_last_line_give_one_fact_one_severity(
     bar.refresh()
     lost_mark = TEXTS[Kind.LOST].mark
     assert bar._bus_icon.mark == view.cards[0]._icon.mark == lost_mark, "one state has one mark"
-    assert row(view, 0)[2] == "✕ lost"
+    assert row(view, 0)[STATE] == "✕ lost"
     assert bar.bus.text() == "CAN main 41 %: lost left knee"
 
 

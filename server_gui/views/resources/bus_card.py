@@ -6,7 +6,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
     QTableWidget,
     QTableWidgetItem,
@@ -47,6 +46,7 @@ LEVELS: Final = {
 TITLES: Final = (
     "Node",
     "Sender",
+    "Identifiers",
     "State",
     "Share",
     "Frames/s",
@@ -55,9 +55,9 @@ TITLES: Final = (
     "Unanswered",
     "PDOs missing",
 )
-NODE, SENDER, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
+NODE, SENDER, IDS, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
 # Left out in this order where there is less room, before a name is shortened.
-SPARE: Final = (SENDS, TRIPS, UNANSWERED, SHARE, MISSING, NODE, FRAMES)
+SPARE: Final = (SENDS, TRIPS, UNANSWERED, IDS, SHARE, MISSING, NODE, FRAMES)
 NUMBERS: Final = (SHARE, FRAMES, TRIPS, UNANSWERED, MISSING)
 SENDERS_HINT: Final = (
     "Each node has the frames that it sends itself. A PDO or request to a node is listed by its kind: "
@@ -91,11 +91,8 @@ class BusCard(Card):
         self.table.horizontalHeader().setSectionResizeMode(SENDER, QHeaderView.ResizeMode.Stretch)
         self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         theme.changed.connect(self._forget)
-        head = QHBoxLayout()
-        head.addWidget(self._icon)
-        head.addWidget(self.load, 1)
-        self.body.addLayout(head)
-        for part in (self._bar, self._counters, self._controller, self._kinds, self.table):
+        self.head.insertWidget(0, self._icon)  # of the bus, not of its load
+        for part in (self.load, self._bar, self._counters, self._controller, self._kinds, self.table):
             self.body.addWidget(part)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -162,7 +159,7 @@ class BusCard(Card):
         """Leave out parts without room as a whole: no number is cut, and no name while a part can go."""
         self._say_states(brief=False)
         shown = self._columns()
-        if FRAMES not in shown:  # a state's mark is enough: what it means stands above
+        if not {SHARE, MISSING, FRAMES} <= shown:  # a state's mark is enough: what it means stands above
             self._say_states(brief=True)
             shown = self._columns()
         for column in range(len(TITLES)):
@@ -226,6 +223,7 @@ def _texts(row: Row) -> tuple[str, ...]:
     return (
         row.node,
         row.name,
+        row.ids,
         _state(row),
         row.share,
         row.frames,
