@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 from PySide6.QtWidgets import QApplication
@@ -91,6 +92,16 @@ def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     bench.station.take([walking(1)])
     show(view, bench, BUS)
     assert view.cards[0]._icon.accessibleName() == "ok"
+
+
+def test_the_load_of_the_last_minutes_is_drawn_with_its_peak(view: BusHealthView, bench: Bench) -> None:
+    for second, load in enumerate((20.0, 85.0, None, 30.0)):
+        bench.station.take([BusesSeen((replace(BUS, load_percent=load),), second * 1_000_000_000)])
+    past = bench.station.processing.bus_loads.recent("main")
+    assert past[:, 1][[0, 1, 3]].tolist() == [20.0, 85.0, 30.0]
+    assert np.isnan(past[2, 1]), "what was not told is a gap"
+    show(view, bench, replace(BUS, load_percent=30.0))
+    assert view.cards[0]._past.note == "peak 85 %"
 
 
 def test_what_is_not_known_is_no_card_and_no_zero(view: BusHealthView, bench: Bench) -> None:

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
@@ -28,15 +29,17 @@ from server_gui.core.processing.bus_health import (
 )
 from server_gui.core.processing.bus_senders import total
 from server_gui.views.resources.load_bar import LoadBar
+from server_gui.views.resources.trend import Floats, Trend
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.plot import css
+from server_gui.views.widgets.plot import Curve, css
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
+LEAST_LOAD: Final = 20.0  # percent: less than that is no hill
 LEVELS: Final = {
     BusHealthLevel.GOOD: Mark("disc", "good", "ok"),
     BusHealthLevel.UNKNOWN: Mark("ring", "old", "not known"),
@@ -76,6 +79,8 @@ class BusCard(Card):
         self._counters = WrappingLegend("Counters of the bus")
         self._controller = WrappingLegend("The gateway's CAN controller")
         self._kinds = WrappingLegend("Traffic by kind")
+        self._past = Trend(theme, "Load over time", LEAST_LOAD, symbol=" %", digits=0)
+        self._past.setObjectName("part")  # of this card: no frame of its own
         self._rows: list[Row] = []
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
@@ -92,7 +97,8 @@ class BusCard(Card):
         self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         theme.changed.connect(self._forget)
         self.head.insertWidget(0, self._icon)  # of the bus, not of its load
-        for part in (self.load, self._bar, self._counters, self._controller, self._kinds, self.table):
+        said = (self._counters, self._controller, self._kinds)
+        for part in (self.load, self._bar, *said, self.table, self._past):
             self.body.addWidget(part)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -121,7 +127,14 @@ class BusCard(Card):
         self._kinds.say(
             [(dim, "", one) for one in (f"Frames/s by kind: {told[0]}", *told[1:])] if told else []
         )
+        self._show_past(station.processing.bus_loads.recent(bus.name), live=live)
         self._show_senders(rows(bus, station.robot.parts, alarms, live=live))
+
+    def _show_past(self, past: Floats, *, live: bool) -> None:
+        times, load = past[:, 0], past[:, 1]
+        known = load[~np.isnan(load)]
+        self._past.set_note(f"peak {known.max():.0f} %" if len(known) else "")
+        self._past.show_rows(self._past, times, [Curve("load", "accent")], [load], live=live)
 
     def _counted(self, bus: BusInfo) -> list[tuple[str, str, str]]:
         text, wrong = css(self._theme, "text"), css(self._theme, "warn")
