@@ -22,7 +22,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
-from server_gui.views.alarms.words import REMEDY, fewer
+from server_gui.views.alarms.words import REMEDY
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
@@ -447,22 +447,6 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     bench.look_again([looked(state="lost", problem="gone")])
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.mark.word == "lost"
-
-
-def test_of_much_to_check_the_first_thing_is_kept_where_not_all_of_it_has_room() -> None:
-    said = ["since 07:28:21, for 4 s · robot: it walks", "→ check its power; check its encoder"]
-    shorter = fewer(said)
-    assert shorter[0] == " · ".join(said)
-    assert shorter[-8:] == (
-        "since 07:28:21, for 4 s · → check its power; check its …",
-        "since 07:28:21, for 4 s · → check its power; check …",
-        "since 07:28:21, for 4 s · → check its power …",
-        "→ check its power; check its …",
-        "→ check its power; check …",
-        "→ check its power …",
-        "since 07:28:21, for 4 s",
-        "",
-    )
 
 
 def test_the_list_of_alarms_is_no_higher_than_its_rows(window: MainWindow, bench: Bench) -> None:

@@ -18,7 +18,6 @@ from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES, Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.alarms.unconfirmed import remedy
 from server_gui.core.desk import station as station_module
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -260,60 +259,6 @@ def test_rows_from_before_the_stop_prove_nothing(bench: Bench) -> None:
     bench.station.stop("test")
     bench.station.take([before])
     assert bench.station.stopping.proofs == {}
-
-
-def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
-    _link_lost(bench)
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("there is no link"))
-    assert kinds(bench.station) == [Kind.NOT_STOPPED, Kind.NO_LINK]
-    assert "MOVING" not in bench.station.alarms.active[0].alarm.line
-    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
-    (alarm,) = (one.alarm for one in bench.station.alarms.active)
-    assert alarm.line.startswith("STILL MOVING: STOP again; the STOP before failed: there is no link")
-    assert alarm.did == "all 6 drives enabled"
-    assert bench.station.mark.word == "STILL MOVING"
-
-
-def test_what_is_to_be_done_stands_before_why_a_stop_is_not_confirmed(bench: Bench) -> None:
-    _link_lost(bench)
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("nothing was sent; no gateway at 127.0.0.1:7420; is it running there?"))
-    alarm = bench.station.alarms.active[0].alarm
-    assert alarm.line == "STOP NOT CONFIRMED: use the hardware stop · no link, nothing was sent"
-    assert alarm.why == "no gateway at 127.0.0.1:7420; is it running there?"
-
-
-def test_where_only_a_controller_is_silent_the_drives_are_said_to_be_off_and_it_may_enable_them(
-    bench: Bench,
-) -> None:
-    at_rest: dict[str, list[float | None]] = {f"{joint}.velocity": [0.0] for joint in JOINTS}
-    bench.station.take([states(6.0), telemetry([time.monotonic_ns()], at_rest)])
-    bench.station.stop("test")
-    bench.first.answer(Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}))
-    (one,) = bench.station.alarms.active
-    said = "all 6 drives are off, the gait controller did not answer: it may enable them again"
-    assert one.alarm.line == f"STOP NOT CONFIRMED: {said}"
-    assert one.alarm.check.startswith("keep the hardware stop at hand, check gait")
-    assert remedy(bench.station.robot, bench.station.stopping)[0] == "keep the hardware stop at hand"
-    bench.station.take([states(4.0)])
-    assert bench.station.mark.word == "STILL MOVING"
-    bench.station.stop("again")
-    bench.first.answer(Stopped({**ALL.drives, "left_knee": "unconfirmed"}, held=True))
-    assert bench.station.stopping.silent == ()
-
-
-def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    bench.station.take([states(5.0, left_knee=4.0)])
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("there is no link"))
-    bench.station.take([states(5.0)])
-    proofs = bench.station.stopping.proofs
-    assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
-    assert proofs["left_hip"].when == "already off"
 
 
 def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_already(bench: Bench) -> None:
