@@ -157,8 +157,7 @@ def doing(station: Station) -> tuple[str, ...]:
     """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live and is_last_held(station):
-        word = "STOPPED" if station.is_linked else f"STOPPED, {AS_KNOWN}"
-        return f"{word} · {no_data(station)}", f"STOPPED · {no_data(station)}", no_data(station)
+        return last_held(station)
     if not station.is_live:
         return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
@@ -179,6 +178,15 @@ def is_last_held(station: Station) -> bool:
     return (
         is_held and bool(words) and all(is_off(word) and state_mark(word).colour == "dim" for word in words)
     )
+
+
+def last_held(station: Station) -> tuple[str, ...]:
+    """Return that it was stopped, and for how long nothing has come; a reset may have ended it meanwhile."""
+    gone = no_data(station)
+    if station.is_linked:
+        words = f"STOPPED · {gone}", f"STOPPED · {gone.replace('data for', 'data')}", "STOPPED · no data"
+        return *words, "STOPPED"
+    return f"STOPPED, {AS_KNOWN} · {gone}", f"STOPPED, {AS_KNOWN}", "STOPPED when last seen", "STOPPED then"
 
 
 def no_data(station: Station) -> str:

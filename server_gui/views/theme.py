@@ -12,7 +12,7 @@ SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 LOOSE: Final = 11  # px beside the name of a page, where there is room for that
 TIGHT: Final = 5  # else
 BASE_POINTS: Final = 9.0
-URGENT: Final = 0.22  # of the alarm's colour in the tint of what endangers somebody now
+URGENT: Final = 0.16  # of the alarm's colour in the tint of what endangers somebody now
 
 
 class Look(Enum):

@@ -9,6 +9,7 @@ from gateway.client import ConnectionState
 from gateway.wire.stop import Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.writing import Trial
+from server_gui.views.frame.header import _drives as header_drives
 from server_gui.views.marks import time_of_day
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
@@ -103,6 +104,8 @@ def test_a_held_stop_stays_in_headline_and_card_while_no_data_comes(
     assert drives.detail._wordings[0].startswith("6/6 confirmed in 1498 ms · no data for 0.")
     assert doing(station)[0].startswith("STOPPED" if linked else "STOPPED, as far as is known")
     assert "no data for 0." in doing(station)[0]
+    assert all(words.startswith("STOPPED") for words in doing(station)), "also where there is little room"
+    assert header_drives(station).main == "Off when last seen"
 
 
 def test_drives_that_were_enabled_when_data_ended_are_not_called_stopped(

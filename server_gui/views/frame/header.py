@@ -17,7 +17,7 @@ from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import SHORTER, Mark, age_text, drives_mark, enabled_text
-from server_gui.views.predictions import OLD, by_steps, status
+from server_gui.views.predictions import OLD, by_steps, is_last_held, no_data, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -232,6 +232,8 @@ def _robot(station: Station) -> Words:
 
 def _drives(station: Station) -> Words:
     count = enabled_text(station.robot, live=station.is_live)  # whole: the rest makes it look better
+    if not station.is_live and is_last_held(station):
+        return Words(Mark("ring", "warn"), "Off when last seen", (no_data(station), count))
     if not station.is_live:
         return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
