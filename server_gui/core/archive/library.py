@@ -53,6 +53,7 @@ class Library:
         self._looking = False
         self._knocking = False
         self._knock_again = False
+        self._known: dict[tuple[str, str], Session] = {}  # as they were when their store was last read
 
     def close(self, within_s: float) -> bool:
         """Look no more; False where a look under way hangs. Idempotent."""
@@ -98,6 +99,10 @@ class Library:
         named = (each for each in self.found.sessions if (each.robot, each.session) == (robot, name))
         return next(named, None)
 
+    def known_before(self, session: Session) -> Session | None:
+        """Return it as it was when the store was last read; None where that was before it began."""
+        return self._known.get((session.robot, session.session))
+
     def files(self, folder: str) -> "Future[list[Object]]":
         """Return every object of the store below a folder."""
         url = self.settings.store.url
@@ -112,6 +117,8 @@ class Library:
         ) or self.revision == 0:
             self.revision += 1
         self.found = found
+        if found.problem is None:
+            self._known = {(each.robot, each.session): each for each in found.sessions}
         if found.is_reached:
             self.reach.listed(found.problem)
         self._reached(found)
