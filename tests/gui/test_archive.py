@@ -88,7 +88,7 @@ def test_the_list_says_that_the_store_is_away_before_its_first_frame(
     shown.open("Cloud")
     archive.library.reach.looked("it cannot be reached")
     shown.window.tabs.setCurrentIndex(0)
-    assert page.said.text() == "The store is not reached, tried again by itself: it cannot be reached"
+    assert page.said.text() == "The store is not reached, retried automatically: it cannot be reached"
     assert page._list.note.startswith("1 session known")
 
 

@@ -66,7 +66,7 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     assert shown.window.tabs.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
-    assert "not reached, tried again by itself" in page.said.text()
+    assert "not reached, retried automatically" in page.said.text()
     assert page._list.note == "0 sessions known; others may be in the store"
     away[0] = False
     shown.until(lambda: shown.window.tabs.recordings.list.sessions.rowCount(), "came back")
@@ -90,10 +90,10 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording.look()
     shown.draw()
     assert "2 batches wait" in cloud.waiting.text()
-    assert "Not uploaded, tried again by itself: the store cannot be reached" in cloud.waiting.text()
+    assert "Not uploaded, retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
-    said = "what was recorded until now waits for the store: an upload failed, tried again by itself"
+    said = "what was recorded until now waits for the store: an upload failed, retried automatically"
     assert said in [item.text for item in bench.desk.news.items]
 
 
@@ -117,7 +117,7 @@ def test_while_the_store_is_away_the_button_tries_again_at_once(
     assert not reach.is_due, "nobody else looks again"
     cloud.upload.click()
     assert keeper.asked[0] == "upload"
-    said = "what was recorded until now waits for the store: it is not reached, tried again by itself"
+    said = "what was recorded until now waits for the store: it is not reached, retried automatically"
     assert said in [item.text for item in bench.desk.news.items]
     shown.until(lambda: reach.state is Reach.REACHED, "looked at once")
     cloud.upload.click()

@@ -53,7 +53,7 @@ class BesideBar(QWidget):
             button.setAccessibleName(name)
             set_tip(button, hint)
             button.toggled.connect(wanted)
-        self.close_button = QPushButton("Put away")
+        self.close_button = QPushButton("Close")
         self.close_button.setAccessibleName("Close the second recording")
         set_tip(self.close_button, CLOSE_HINT)
         self.close_button.clicked.connect(self._close)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -40,10 +40,12 @@ from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.cursors import FLAGS
 from server_gui.views.widgets.files import ask_save
+from server_gui.views.widgets.mark import mark_icon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.workspace.page import AROUND_S, Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
@@ -52,9 +54,12 @@ EVENTS_HINT: Final = "Its events; choose one to see its instant"
 NO_EVENTS_HINT: Final = (
     "Nothing happened in it: no gap, no mark, no change of a drive, no line of the journal"
 )
-NOT_REPLAYED: Final = "· without alarms of buses and computers"
+NOT_REPLAYED: Final = (
+    "· trouble of its buses was not recorded",
+    "· without its buses",
+)  # where there is room
 NOT_REPLAYED_HINT: Final = (
-    "What is replayed are the robot's signals: what its buses or computers lacked then does not show"
+    "What is replayed are the robot's signals: it was recorded by another version, without its buses' trouble"
 )
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SETTLES: Final = 8  # frames until all plots are there
@@ -152,6 +157,7 @@ class Player(QWidget):
     def show_tape(self) -> None:
         """Show another recording."""
         if self._playback.tape is not None:
+            self.unseen.say(*([""] if self._playback.tape.tells_of_buses else [*NOT_REPLAYED, ""]))
             self.timeline.show_tape(self._playback.tape)
             self.timeline.setFocus()
             self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
@@ -283,9 +289,7 @@ class Player(QWidget):
         self._speed.setAccessibleName("Speed of the playback")
         self._speed.currentIndexChanged.connect(self._set_speed)
         self.place = PlainLabel()
-        self.unseen = ElidedLabel("dim", Qt.TextElideMode.ElideRight)
-        self.unseen.setText(NOT_REPLAYED)
-        self.unseen.setAccessibleName(NOT_REPLAYED)
+        self.unseen = ShrinkingLabel("dim")
         set_tip(self.unseen, NOT_REPLAYED_HINT)
         self.export = QPushButton("Export")
         menu = QMenu(self.export)
@@ -375,7 +379,8 @@ class Player(QWidget):
         for flag in self._in_order:
             at = clock_text((flag.at_ns - tape.first_ns) / SECOND_NS, 1)
             text = plain(f"{at}  {self.timeline.told(flag)}").replace("&", "&&")
-            menu.addAction(text).triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
+            action = menu.addAction(mark_icon(self._theme, FLAGS[flag.kind]), text)
+            action.triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
 
     @property
     def _in_order(self) -> list[Flag]:
