@@ -89,7 +89,8 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
     cloud._recording.look()
     shown.draw()
-    assert "2 batches wait" in cloud.waiting.text()
+    assert "2 batches wait · 5.0 MiB on this computer · " in cloud.waiting.text()
+    assert cloud.waiting.text().count("uploaded") == 1
     assert "Not uploaded, retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
@@ -110,6 +111,10 @@ def test_while_the_store_is_away_the_button_tries_again_at_once(
     shown.draw()
     assert cloud.upload.text() == "Try again now"
     assert cloud.upload.isEnabled()
+    assert cloud.state.width() > cloud._cards["Store"].width() * 0.8, "a reason has all of the width"
+    again = next(one for one in cloud.findChildren(QPushButton) if one.text() == "Look again")
+    assert again.toolTip() != cloud.upload.toolTip(), "both say what they do"
+    assert again.geometry().bottom() <= cloud.state.geometry().top()
     keeper = FakeKeeper(report())
     cloud._recording = recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
     recording.rely_on(reach)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.metadata
+import re
 
 import pytest
 from msgspec.structs import replace
@@ -149,7 +150,9 @@ def test_back_before_the_fault_its_line_says_that_there_was_none_then(
     archive.playback.seek(tape.first_ns + 1_000_000_000)
     shown.until(lambda: not player.alarms.told, "went back")
     shown.until(lambda: player.alarms.headline.text() == "No alarm then", "said so")
-    assert "buses and computers are not" in player.alarms.details.text(), "nobody has looked at these"
+    assert "trouble of its buses is on the time axis" in player.alarms.details.text(), (
+        "nobody has looked at these"
+    )
     assert player.alarms.isVisible(), "nothing moves"
 
 
@@ -199,6 +202,18 @@ def test_a_recording_that_stands_still_is_said_to_be_paused_alone(
     player.signals.pause.click()
     shown.draw()
     assert player.signals.said.text() == "Paused"
+    playback, tape = archive.playback, archive.playback.tape
+    assert tape is not None
+    player.signals.choose(["left_knee.current"])
+    for _ in range(2):  # it goes on, and stands still with the curve
+        player.signals.pause.click()
+        player.signals.refresh()
+    axis = player.signals.plots[0].plot.getPlotItem().getAxis("bottom")
+    at_s = (playback.position_ns - tape.first_ns) / 1e9
+    assert axis._since_s == pytest.approx(at_s, abs=0.1), "it counts as the bar below does"
+    [(step, offset)] = axis.tickSpacing(-5.0, 0.0, 500.0)
+    text = axis.tickStrings([offset - step], 1.0, step)[0]
+    assert re.fullmatch(r"\d:\d\d(\.0)?|\d:\d\d\.\d", text)
 
 
 def test_a_replay_says_that_buses_are_missing_in_it_only_where_they_are(

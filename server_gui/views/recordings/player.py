@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -47,6 +47,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.workspace.page import AROUND_S, Signals
+from server_gui.views.workspace.plot_area import NO_CURVES
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
@@ -61,6 +62,7 @@ NOT_REPLAYED: Final = (
 NOT_REPLAYED_HINT: Final = (
     "What is replayed are the robot's signals: it was recorded by another version, without its buses' trouble"
 )
+READING: Final = "reading both recordings …"
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SETTLES: Final = 8  # frames until all plots are there
 SLOW: Final = 5  # frames between two looks at what people read
@@ -75,6 +77,8 @@ class Player(QWidget):
 
     def __init__(self, archive: Archive, theme: Theme) -> None:
         super().__init__()
+        self.setObjectName("playback")  # with a frame: it looks like what is live
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._archive = archive
         self._playback = archive.playback
         self._theme = theme
@@ -175,6 +179,7 @@ class Player(QWidget):
         self._end_comparing()
         self.beside.open(session)
         self.beside_bar.refresh()
+        self.signals.show_tools(on=False)
         self.labelling.setChecked(self._has_room_for_all)
         self._choice.button(SIGNALS).click()
 
@@ -210,6 +215,8 @@ class Player(QWidget):
     def _refresh_beside(self) -> None:
         """Bring the second recording into the plots once it is there."""
         station, scene = self.beside.station, self.signals.scene
+        is_read = self.beside.session is None or bool(self.beside.problem)
+        set_text(self.signals.empty, NO_CURVES if is_read else READING)
         if station is not None and scene.beside is None and self._before is not None:
             self.beside_bar.close_button.click()  # it was put away in the menu of the signals
         elif station is not None and (scene.beside is None or scene.beside.station is not station):
