@@ -90,7 +90,7 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording.look()
     shown.draw()
     assert "2 batches wait · 5.0 MiB on this computer · " in cloud.waiting.text()
-    assert cloud.waiting.text().count("uploaded") == 1
+    assert "2 batches uploaded\n" in cloud.waiting.text()
     assert "Not uploaded, retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
