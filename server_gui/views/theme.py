@@ -136,6 +136,7 @@ QLabel#dim[tone="bad"] {{ color: {bad}; }}
 QLabel#dim[tone="warn"] {{ color: {warn}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
+QWidget#playback {{ border: 1px solid {warn}; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}
 QLabel#banner[tone="plain"] {{ background: {card}; border-color: {border}; }}
 QLabel#banner[tone="bad"] {{ border-color: {bad}; }}

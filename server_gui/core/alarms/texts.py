@@ -33,12 +33,12 @@ class Kind(Enum):
     STALLED = "computer paused"
     UNKNOWN = "state not known"
     BUS_BUSY = "bus busy"
-    BUS = "bus trouble"
     BLIND = "guard blind"
     DANGER_ADVICE = "danger possible"
-    REPORTS = "warning"
     RECORDING = "recording"
     UPLOAD = "store"
+    BUS = "bus trouble"
+    REPORTS = "warning"
     RESET = "stop reset"
 
 

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QT
 
 from server_gui.views.frame.dock_title import DockTitle, HasTools
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
@@ -158,6 +159,12 @@ class Docks(QObject):
     def _usual_widths(self) -> tuple[int, int]:
         width = self._window.width()
         return next(widths for least, widths in WIDTHS if width >= self._theme.px(least))
+
+    def call(self, dock: QDockWidget, name: str) -> None:
+        """Call it so in its title bar, where it has one with its name."""
+        bar = dock.titleBarWidget()
+        if isinstance(bar, DockTitle):
+            set_text(bar.name, name)
 
     def _stack(self) -> None:
         """One behind the other; their tabs say what they are, so that they need no title."""

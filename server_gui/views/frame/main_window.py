@@ -61,6 +61,8 @@ from server_gui.views.widgets.visibility import has_focus_in, is_seen
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
+EVENTS: Final = 2  # among the docks
+EVENTS_LIVE: Final = "Events, live"  # beside a recording that is played
 ROBOTS: Final = 9  # that have a key
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
@@ -195,6 +197,7 @@ class MainWindow(QMainWindow):
         self.robots.refresh()
         self.parameters.refresh()
         self.events.refresh()
+        self._panels.call(self.docks[EVENTS], EVENTS_LIVE if self.tabs.shows_playback else "Events")
         self._bar.refresh()
         now = self.tabs.overview.now
         elsewhere = (self.parameters.trial, now.trial)

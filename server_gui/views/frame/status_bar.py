@@ -92,7 +92,7 @@ class StatusBar(QStatusBar):
         self._icon.show_mark(TONES[said.tone])
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
-        short = said.text.partition(" · ")[0]
+        short = " · ".join(filter(None, (said.text.partition(" · ")[0], said.reason)))
         wordings = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
         self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)

@@ -70,27 +70,44 @@ def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
     entries = [
         entry("stop", 5, who="jkim", reason="F12"),
         entry("write", 6, who="jkim", after={"gait.step": 1}),
-        entry("write", 7, after={"a.b": 1}, trial_s=9.0),
+        entry("write", 7, before={"a.b": 0.5}, after={"a.b": 1}, trial_s=9.0),
         entry("stop", 8, boot_id="another"),
         entry("control acquired", 9),
     ]
     assert list(of_journal(entries, "b")) == [
         Flag(5, "stop by jkim: F12", FlagKind.STOP),
         Flag(6, "write gait.step by jkim", FlagKind.WRITE),
-        Flag(7, "write a.b", FlagKind.TRIAL),
+        Flag(7, "write a.b 0.5 → 1", FlagKind.TRIAL),
     ]
     assert [flag.at_ns for flag in of_recorded_journal(entries)] == [50, 60, 70, 80]
 
 
+def test_what_a_window_wrote_is_told_without_its_port() -> None:
+    here, there = (
+        entry(
+            "write",
+            at,
+            who=f"gwrms gui ({host}:33912)",
+            before={"gait.step": 400.0},
+            after={"gait.step": 420.0},
+        )
+        for at, host in ((1, "127.0.0.1"), (2, "10.0.0.7"))
+    )
+    assert [flag.text for flag in of_journal([here, there], "b")] == [
+        "write gait.step 400 → 420 from the window",
+        "write gait.step 400 → 420 from the window on 10.0.0.7",
+    ]
+
+
 def test_a_trial_that_the_robot_took_back_is_told_with_why() -> None:
     entries = [
-        entry("taken back", 5, who="gateway", reason="its time was over"),
+        entry("taken back", 5, who="gateway", reason="time ran out"),
         entry("taken back", 5, who="gateway", reason="asked for"),
         entry("stop", 6, who="guard", reason="knee_heat: 71 N·m"),
     ]
     assert [flag.text for flag in of_journal(entries, "b")] == [
-        "taken back: its time was over",
-        "taken back: as somebody asked for",
+        "taken back: time ran out",
+        "taken back on request",
         "stop by guard: knee_heat: 71 N·m",
     ]
 
