@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Final, Protocol
 
 from server_gui.core.commissioning import messages
@@ -124,6 +125,11 @@ class Commissioning:
     @property
     def runs(self) -> bool:
         return self.look_of.runs
+
+    @property
+    def name(self) -> str:
+        """The robot's name, which its file has; "" before one was named."""
+        return "" if self.wish is None else Path(self.wish.file).stem
 
     @property
     def can_start(self) -> bool:

@@ -70,6 +70,11 @@ class Desk:
         for station in self.stations:
             station.flag(text, ago_s)
 
+    @property
+    def whose(self) -> str:
+        """Name of the robot that is looked at, where there are others; "" where it goes without saying."""
+        return self.selected.title if self.selected is not None and len(self.stations) > 1 else ""
+
     def add(self, station: Station) -> None:
         """Add a robot; the first is selected."""
         self.stations.append(station)

@@ -1,6 +1,5 @@
 """State of commissioning in words, with STOP beside it: always visible on the page."""
 
-from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
@@ -74,7 +73,7 @@ class Bar(QWidget):
         self._start.setVisible(not now.runs)
         self.interrupt.setVisible(now.runs)
         self.stop.setEnabled(now.can_stop)
-        self.stop.name(None if now.wish is None else Path(now.wish.file).stem)
+        self.stop.name(now.name or None)
         self.stop.setAccessibleName("STOP the drives that are commissioned")
 
     def _restyle(self) -> None:

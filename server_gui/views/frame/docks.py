@@ -18,6 +18,8 @@ BELOW: Final = (120, 76)  # high, likewise: events, where the window is `HIGH` a
 HIGH: Final = 820
 TIGHT: Final = 800  # wide, likewise: what is narrower begins without panels, which would hide the robot
 STACK: Final = 356  # wide, likewise: panels that are one behind the other
+BUTTONS: Final = 80  # wide, likewise: what stands beside a panel's title
+IN_TAB: Final = 100  # wide, likewise: the robot's name, where panels are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
 Area = Qt.DockWidgetArea
 
@@ -88,6 +90,18 @@ class Docks(QObject):
         for one in (*(self.all[:-1] if self.is_narrow else ()), dock):
             one.show()
         dock.raise_()
+
+    def say_whose(self, dock: QDockWidget, name: str) -> None:
+        """Name the robot in a panel's title, cut in its middle where it has no room; "" names none."""
+        title, metrics = dock.objectName(), dock.fontMetrics()
+        if name:
+            before = f"{title} – "
+            beside = metrics.horizontalAdvance(before) + self._theme.px(BUTTONS)
+            room = self._theme.px(IN_TAB) if self.is_narrow else dock.width() - beside
+            title = before + metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room)
+        if dock.windowTitle() != title:
+            dock.setWindowTitle(title)
+            dock.toggleViewAction().setText(dock.objectName())
 
     @property
     def has_room(self) -> bool:

@@ -150,7 +150,7 @@ class MainWindow(QMainWindow):
         self._is_closing = self._is_ending = False
         if commissioning is not None:
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
-        self._bar = StatusBar(desk, theme)
+        self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
         self.page_bar = PageBar(self.tabs, self._help_corner())
         column.addWidget(self.experiment)
@@ -194,6 +194,7 @@ class MainWindow(QMainWindow):
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
+        self._panels.say_whose(self.docks[1], self._desk.whose)
         self.events.refresh()
         self._bar.refresh()
         now = self.tabs.overview.now
