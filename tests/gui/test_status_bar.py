@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 
 import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
 
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.request import CommissioningRequest
@@ -15,7 +17,7 @@ from tests.support.commissioning import FakeTalker
 
 @pytest.fixture
 def commissioning() -> Commissioning:
-    return Commissioning(lambda arguments, computer: FakeTalker())
+    return Commissioning(FakeTalker)
 
 
 @pytest.fixture
@@ -29,13 +31,13 @@ def bar(theme: Theme, bench: Bench, commissioning: Commissioning) -> Iterator[St
 
 @pytest.mark.parametrize("width", [1366, 1024, 800])
 def test_it_says_not_an_emergency_stop_whatever_is_beside_it(
-    bar: StatusBar, bench: Bench, width: int, qt: object
+    bar: StatusBar, bench: Bench, width: int
 ) -> None:
     bar.resize(width, 24)
     for label in (bar.computer, bar.bus, bar.recording):
         label.say("CPU 100 % · memory 6 % · most: recorder 51 % of a core, and much more", "CPU 100 %")
     bar._hold_stop()
-    bar.layout().activate()
+    QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
     assert "not an" in bar.stop.shown.replace("not a safety", "not an")
     assert bar.stop.is_whole
 

@@ -43,6 +43,7 @@ class Desk:
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
+        self.commissions: Callable[[], bool] = lambda: False  # whether a robot is commissioned in this window
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:
@@ -73,7 +74,12 @@ class Desk:
     @property
     def whose(self) -> str:
         """Name of the robot that is looked at, where there are others; "" where it goes without saying."""
-        return self.selected.title if self.selected is not None and len(self.stations) > 1 else ""
+        return self.selected.title if self.selected is not None and self.has_several else ""
+
+    @property
+    def has_several(self) -> bool:
+        """Whether a robot is to be named: there are others, or one that is commissioned beside it."""
+        return len(self.stations) > 1 or self.commissions()
 
     def add(self, station: Station) -> None:
         """Add a robot; the first is selected."""

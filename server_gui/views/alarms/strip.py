@@ -92,7 +92,7 @@ class AlarmStrip(ClickableFrame):
     @property
     def named(self) -> bool:
         """Whether it must be said whose an alarm is."""
-        return len(self._desk.stations) > 1
+        return self._desk.has_several
 
     def refresh(self) -> None:
         """Show what is wrong now."""

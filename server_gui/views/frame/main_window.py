@@ -149,6 +149,7 @@ class MainWindow(QMainWindow):
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
+            desk.commissions = lambda: commissioning.wish is not None
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
@@ -188,6 +189,8 @@ class MainWindow(QMainWindow):
         """All but the page."""
         self._pages.setCurrentIndex(1 if shown else 0)
         self.page_bar.setVisible(shown)
+        if self._panels.hold_back(is_held=not self._desk.stations):
+            self._fit()
         self.header.refresh()
         self.stopped_all.refresh()
         self.alarms.refresh()
