@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.stop_all import StopAll, StopAllResult
 from server_gui.core.evidence.file import EditEvidence
-from server_gui.core.follow.news import News
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.tuning.stop import Sent
 
@@ -90,6 +91,8 @@ class Desk:
 
     def remove(self, station: Station) -> None:
         """Look at it no more; another one is selected where it was."""
+        if not station.robot.is_recording:
+            station.tell(NewsKind.CONTROL, f"removed from this window{_left_as(station)}")
         self.stations.remove(station)
         if self.selected is station:
             self.select(self.stations[0] if self.stations else None)
@@ -121,3 +124,12 @@ class Desk:
         if found is None:
             self._stop_all = None
         return found
+
+
+def _left_as(station: Station) -> str:
+    """Return how a robot is that nobody sees any more here, in words; "" where nothing of it is enabled."""
+    if not station.is_live:
+        return "; whether its drives are enabled was not known"
+    return (
+        " while its drives were enabled: its STOP is not here any more" if any_enabled(station.robot) else ""
+    )

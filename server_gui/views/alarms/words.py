@@ -36,6 +36,26 @@ def gathered(desk: Desk) -> list[Told]:
     return found + [(station, one) for station in desk.stations for one in station.alarms.active]
 
 
+def in_order(desk: Desk) -> list[Told]:
+    """Return every alarm: what is bad, then of the robot that is looked at, the worst first.
+
+    How to go on after a reset is what its user looks for next: only what is bad goes before.
+    """
+    selected = desk.selected
+    return sorted(
+        gathered(desk),
+        key=lambda told: (
+            told[1].is_acknowledged,
+            told[1].alarm.kind is not Kind.NOT_STOPPED,
+            told[1].alarm.mark.colour != "bad",
+            told[0] is not None and told[0] is not selected,
+            told[1].alarm.kind is not Kind.RESET,
+            told[1].alarm.rank,
+            told[1].since_s,
+        ),
+    )
+
+
 def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:
     """Return that there is no alarm, where that is known."""
     if station is None:
