@@ -13,7 +13,7 @@ from server_gui.core.alarms.severity import bus_level, worsened_by
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.recording import Tone
+from server_gui.core.desk.recording import LATE, NOTHING, Tone
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, load_text, seen, worst
 from server_gui.views.frame.recording_chip import TONES
@@ -138,7 +138,11 @@ class StatusBar(QStatusBar):
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
         short = said.text.partition(" · ")[0]
-        wordings = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        wordings: tuple[str, ...] = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        if NOTHING in said.text.split(" · "):  # why it is no good, before that it goes on
+            wordings = (*wordings[:2], f"{short}: {NOTHING}", NOTHING)
+        if first == LATE:
+            wordings = (LATE.capitalize(), said.text)
         self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)
 
