@@ -204,7 +204,6 @@ class EventsPanel(QWidget):
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(0)
         self._column.addWidget(self.table, 1)
-        self._column.addStretch(0)  # what is left of a row
         self.hold_tools()
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -233,10 +232,10 @@ class EventsPanel(QWidget):
         """Show whole rows: one that is cut is not read."""
         row, frame = self.table.verticalHeader().defaultSectionSize(), 2 * self.table.frameWidth()
         own = self.tools.height() if self.tools.parentWidget() is self and self.tools.isVisible() else 0
-        room = max(self.height() - own, self.table.minimumHeight())
-        high = max(room - frame, row) // row * row + frame
-        if self.table.maximumHeight() != high:
-            self.table.setMaximumHeight(high)
+        room = self.height() - own - frame
+        left = room % row if room > 2 * row else 0  # of a row, below the last whole one
+        if self._column.contentsMargins().bottom() != left:
+            self._column.setContentsMargins(0, 0, 0, left)
 
     def hold_tools(self) -> None:
         """Have the filter above the events: where no title bar has it."""
@@ -255,7 +254,7 @@ class EventsPanel(QWidget):
 
     def _restyle(self) -> None:
         self.table.verticalHeader().setDefaultSectionSize(self._theme.px(19))
-        self.table.setMinimumHeight(2 * self._theme.px(19) + 2 * self.table.frameWidth())
+        self.table.setMinimumHeight(self._theme.px(40))
         self._hold_rows()
 
 
