@@ -7,6 +7,7 @@ from gateway.wire.stop import Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import fault, settle
@@ -131,7 +132,7 @@ def test_names_on_the_stops_of_two_cards_have_one_weight(window: MainWindow, ben
 
 
 def test_stop_all_is_in_sight_beside_the_pages_where_the_list_of_robots_is_not(
-    window: MainWindow, bench: Bench
+    window: MainWindow, bench: Bench, theme: Theme
 ) -> None:
     settle(window, bench)
     window.docks[0].hide()
@@ -140,10 +141,17 @@ def test_stop_all_is_in_sight_beside_the_pages_where_the_list_of_robots_is_not(
     bench.add("exo-02", 7421)
     settle(window, bench)
     assert window.stop_everyone.isVisible()
+    for scale in (1.0, 1.5, 2.0):
+        theme.set(scale=scale)
+        bench.draw(window)
+        assert window.stop_everyone.lines == ["ALL"], "STOP alone would be that of one robot"
+        assert window.stop_everyone.is_whole
     asked: list[bool] = []
     window.stop_all.connect(lambda: asked.append(True))
     window.stop_everyone.pressed.emit()
     assert asked
+    theme.set(scale=1.0)
+    settle(window, bench)
     window.docks[0].show()
     settle(window, bench)
     assert not window.stop_everyone.isVisible()

@@ -197,7 +197,7 @@ class EventsPanel(QWidget):
         self.table.activated.connect(self._activated)
         self.tools = QWidget()
         tools = QHBoxLayout(self.tools)
-        tools.setContentsMargins(4, 3, 4, 2)
+        tools.setContentsMargins(4, 1, 4, 1)
         tools.addWidget(self.words, 1)
         tools.addWidget(self.kinds)
         self._column = QVBoxLayout(self)

@@ -14,7 +14,7 @@ LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # with range and default.
 WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 492)), (0, (225, 400)))
 ROOMY: Final = 1200  # wide, at text of 100 %: what is narrower has no room for everything at once
-BELOW: Final = (120, 93)  # high, likewise: events, where the window is `HIGH` and where it is not
+BELOW: Final = (120, 86)  # high, likewise: events, where the window is `HIGH` and where it is not
 HIGH: Final = 820
 TIGHT: Final = 800  # wide, likewise: what is narrower begins without panels, which would hide the robot
 STACK: Final = 356  # wide, likewise: panels that are one behind the other

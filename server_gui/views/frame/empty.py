@@ -16,8 +16,8 @@ WIDTH = 560  # at text of 100 %: longer lines are not read
 ADDRESS = "192.168.100.200:7420"  # whole in its field
 AROUND = 24  # pixels around what is typed, at text of 100 %
 ADD = (
-    "Address that `gwrms gateway` prints. A robot that has keys shows a code to pair with: "
-    "`sudo gwrms keys pair`."
+    "Address that “gwrms gateway” prints. A robot that has keys shows a code to pair with: "
+    "“sudo gwrms keys pair”."
 )
 HINT = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."

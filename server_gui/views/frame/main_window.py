@@ -63,6 +63,7 @@ SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
 ROBOTS: Final = 9  # that have a key
+ALL_WIDE: Final = 160  # STOP ALL beside the pages, at text of 100 %, at most
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
 
@@ -211,6 +212,7 @@ class MainWindow(QMainWindow):
     def _offer_stop_all(self) -> None:
         """Have it in sight beside the pages where the panel with the robots is not."""
         is_needed = len(self._desk.stations) > 1 and not is_seen(self.robots.all_stop)
+        self.stop_everyone.allow(self._theme.px(ALL_WIDE))
         if self.stop_everyone.isHidden() is is_needed:
             self.stop_everyone.setVisible(is_needed)
             self.page_bar.arrange()  # now: else what is below moves a frame later
@@ -389,6 +391,7 @@ class MainWindow(QMainWindow):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(2)
         row.addWidget(self.stop_everyone)
+        row.addSpacing(12)
         row.addWidget(self.panels_button)
         row.addWidget(self.help_button)
         return corner
