@@ -33,6 +33,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationSta
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
+BOTH: Final = "steps and model"  # that an agreement or a difference is between
 STEPS_BY: Final = {
     EventSource.KINEMATICS: "steps by its joints",
     EventSource.FOOT_IMU: "steps by its foot's IMU",
@@ -161,13 +162,20 @@ def doing(station: Station) -> tuple[str, ...]:
     if not station.is_live:
         return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
+    if line.mark.word == STOPPED and station.stopping.held:  # as the line above says
+        return tuple(dict.fromkeys((count, count.replace(" of ", "/"))))
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
     short = line.short_text
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
-    least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
+    bare = PROBABLE.sub("", short)
+    least = f"{bare} · {count.replace(' of ', '/')}"
     fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
-    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count, fewest)))
+    return tuple(
+        dict.fromkeys(
+            (f"{cadence} · {count}", f"{short} · {count}", f"{bare} · {count}", least, count, fewest)
+        )
+    )
 
 
 def is_last_held(station: Station) -> bool:
@@ -208,7 +216,7 @@ def lines(station: Station) -> Iterator[PredictionRow]:
                 line = _stride(station, line)
             if not station.is_live and line.mark.colour != "bad":
                 line = PredictionRow(Mark("ring", "old", "not known"), "not known", "no live data")
-            yield replace(line, text=f"{title}: {line.text}", brief=line.brief and f"{title}: {line.brief}")
+            yield replace(line, text=f"{title}: {line.text}", brief=_brief(title, line.brief))
     if predictions.problem:
         yield PredictionRow(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
@@ -341,7 +349,13 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
         return replace(line, text="steps and model agree", brief="model agrees")
     mark = Mark("triangle", "warn", "differs")
     apart_by = f"{max(differences):.0f} % apart"
-    return replace(line, mark=mark, text=f"steps and model {apart_by}", brief=apart_by)
+    said = f"{BOTH} {apart_by}"
+    return replace(line, mark=mark, text=said, brief=said)
+
+
+def _brief(title: str, brief: str) -> str:
+    """Return a brief wording under its title; what says itself between which it is needs none."""
+    return brief and (brief if brief.startswith(BOTH) else f"{title}: {brief}")
 
 
 def _knows(shown: Told) -> bool:

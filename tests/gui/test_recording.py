@@ -40,9 +40,11 @@ from server_gui.core.settings.server_file import (
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.recording_chip import stop_question
+from server_gui.views.frame.status_bar import StatusBar
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from tests.fake_robot import FakeRobot
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Bench, destroy
 from tests.gui.running import running, wait
 
 ADDRESS = "192.0.2.7:7420"
@@ -457,3 +459,14 @@ def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
         monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.0)
         (tmp_path / "spool").unlink()
         wait(lambda: rows(app, "exo-01") > 0, "recorded, once it could")
+
+
+def test_that_nothing_comes_is_said_in_the_last_line_however_little_room_there_is(
+    theme: Theme, bench: Bench
+) -> None:
+    bar = StatusBar(bench.desk, theme)
+    bench.desk.recording = looked(FakeKeeper(report(age_s=None)))[0]
+    bar.refresh()
+    assert "nothing comes" in bar.recording._wordings[0]
+    assert bar.recording._wordings[-1] == "nothing comes"
+    destroy(bar)

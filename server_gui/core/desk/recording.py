@@ -28,6 +28,9 @@ WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
 NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
 NOTHING: Final = "nothing comes"
+LATE_WHY: Final = "this computer is busy"
+LATE: Final = f"recording is late: {LATE_WHY}"  # for a moment; all words for it begin alike
+CHECK_LATE: Final = "end other programs on this computer"
 NO_ROBOT: Final = "No robot to record"
 COMES_S: Final = 3.0  # since the newest row: then nothing comes any more
 DAMAGED: Final = "gwrms cloud verify says what is missing, gwrms cloud mend brings it again"
@@ -153,8 +156,8 @@ class Recording:
 
     def see(self, threads: Sequence[Trouble], by: By = By.WINDOW) -> None:
         """Show problems of the threads that follow, record and predict: this window's, or another's."""
-        told = {trouble.thread: trouble.text for trouble in self._threads.get(by, ())}
-        now = {trouble.thread: trouble.text for trouble in threads}
+        told = {trouble.thread: _told_as(trouble) for trouble in self._threads.get(by, ())}
+        now = {trouble.thread: _told_as(trouble) for trouble in threads}
         for thread, text in now.items():
             if told.get(thread) != text:
                 self._begun(text)
@@ -269,6 +272,8 @@ class Recording:
             what = said.detail or said.text
             check = CREATE if NO_FOLDER in what else check_of(Kind.NOT_RECORDED)
             yield Alarm(Kind.NOT_RECORDED, "", what, check=check)
+        if said.detail == LATE:
+            yield Alarm(Kind.RECORDING, "late", LATE_WHY, "recorder", check=CHECK_LATE)
         if self.reach.trouble is not None:
             yield Alarm(Kind.UPLOAD, "", self.reach.trouble, check=check_of(Kind.UPLOAD))
         if report is None:
@@ -289,9 +294,11 @@ class Recording:
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why, "REC off")
         threads = self._threads.get(self.by, ())
-        ended = [known.text for known in threads if known.thread in NEEDED and not known.works]
+        ended = [known for known in threads if known.thread in NEEDED and not known.works]
+        if ended and all(known.is_late for known in ended):
+            return Said(Tone.WARNING, LATE.partition(":")[0].capitalize(), LATE, "REC late")
         if ended:
-            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(ended))
+            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(known.text for known in ended))
         if self.problem is not None:
             return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
         if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
@@ -414,6 +421,11 @@ class Recording:
 
     def _tell(self, kind: NewsKind, text: str) -> None:
         self._news.add(kind, WHO, text)
+
+
+def _told_as(trouble: Trouble) -> str:
+    """Return a thread's trouble as the window says it everywhere."""
+    return LATE if trouble.is_late and trouble.thread in NEEDED else trouble.text
 
 
 def _queue(report: CollectorReport, *, is_reached: bool) -> list[str]:

@@ -358,7 +358,7 @@ class Station:
                 return
             self.stopping.was_reset(reset.held)
             said, stays = after_reset(reset, go_on(Kind.RESET, self.robot))
-            self.tell(NewsKind.STOP, said)
+            self.tell(NewsKind.STOP if reset.held or stays else NewsKind.RESET, said)
             if stays:
                 self.tell(NewsKind.FAULT, stays)
                 failed(stays)

@@ -17,9 +17,9 @@ from server_gui.views.alarms.words import (
     Told,
     details,
     fewer,
-    gathered,
     going_on,
     headline,
+    in_order,
     key_of,
     leading,
     now_s,
@@ -92,11 +92,11 @@ class AlarmStrip(ClickableFrame):
     @property
     def named(self) -> bool:
         """Whether it must be said whose an alarm is."""
-        return len(self._desk.stations) > 1
+        return self._desk.has_several
 
     def refresh(self) -> None:
         """Show what is wrong now."""
-        before, self.told = self.told, tuple(self._active())
+        before, self.told = self.told, tuple(in_order(self._desk))
         first = self.told[0] if self.told else None
         if before and first is not None and key_of(before[0]) != key_of(first):
             self._changed_s = time.monotonic()
@@ -147,25 +147,6 @@ class AlarmStrip(ClickableFrame):
     def _turn(self) -> None:
         if self.told or self.list.isVisible():
             self.list.turn()
-
-    def _active(self) -> list[Told]:
-        """Of all robots and the recording: what is bad, then of the one that is looked at.
-
-        How to go on after a reset is what its user looks for next: only what is bad goes before.
-        """
-        selected = self._desk.selected
-        return sorted(
-            gathered(self._desk),
-            key=lambda told: (
-                told[1].is_acknowledged,
-                told[1].alarm.kind not in UNSTOPPED,
-                told[1].alarm.mark.colour != "bad",
-                told[0] is not None and told[0] is not selected,
-                told[1].alarm.kind is not Kind.RESET,
-                told[1].alarm.rank,
-                told[1].since_s,
-            ),
-        )
 
     def _say_again(self) -> None:
         self._say(self.told[0] if self.told else None)

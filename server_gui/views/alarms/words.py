@@ -8,7 +8,7 @@ from typing import Final
 from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.overload import ALSO
-from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
@@ -34,6 +34,26 @@ def gathered(desk: Desk) -> list[Told]:
     """Return every alarm: of the recording, then of each robot."""
     found: list[Told] = [(None, one) for one in desk.recording.alarms.active]
     return found + [(station, one) for station in desk.stations for one in station.alarms.active]
+
+
+def in_order(desk: Desk) -> list[Told]:
+    """Return every alarm: what is bad, then of the robot that is looked at, the worst first.
+
+    How to go on after a reset is what its user looks for next: only what is bad goes before.
+    """
+    selected = desk.selected
+    return sorted(
+        gathered(desk),
+        key=lambda told: (
+            told[1].is_acknowledged,
+            told[1].alarm.kind not in UNSTOPPED,
+            told[1].alarm.mark.colour != "bad",
+            told[0] is not None and told[0] is not selected,
+            told[1].alarm.kind is not Kind.RESET,
+            told[1].alarm.rank,
+            told[1].since_s,
+        ),
+    )
 
 
 def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:

@@ -31,7 +31,7 @@ class DockTitle(QWidget):
         self.name = PlainLabel(dock.windowTitle())
         self.name.setObjectName("title")
         row = QHBoxLayout(self)
-        row.setContentsMargins(12, 2, 4, 2)
+        row.setContentsMargins(12, 0, 4, 0)
         row.addWidget(self.name)
         row.addWidget(panel.tools, 1)
         turn = "Float", FLOAT_HINT, lambda: dock.setFloating(not dock.isFloating())

@@ -318,12 +318,13 @@ class JointTable(QTableView):
                 shown = self._with_room(widths)
             if sum(widths[known] for known in shown) <= room:
                 break
-        least = (ANGLE, ERROR) if self._model.errors else (ERROR, ANGLE)  # errors stand below the table, too
+        has_errors = bool(self._model.errors)  # which stand below the table, too
+        least = (TORQUE, ANGLE, ERROR) if has_errors else (ERROR, TORQUE, ANGLE)
         last = (STOP,) if self._model.is_stop_news else ()  # the proof of a STOP goes after all else
-        for column in (TORQUE, *least, *last):
+        for column in (*least, *last):
             if sum(widths[known] for known in shown) > room:
                 shown.discard(column)
-        if sum(widths[known] for known in shown) + widths[ERROR] <= room:
+        if has_errors and sum(widths[known] for known in shown) + widths[ERROR] <= room:
             shown.add(ERROR)
         return widths, shown
 
