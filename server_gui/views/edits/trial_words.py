@@ -7,6 +7,7 @@ from gateway.amounts import counted
 from gateway.units import Units
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
+from server_gui.core.evidence.edits import SETTLE_NS
 from server_gui.core.evidence.wording import share
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
@@ -74,6 +75,16 @@ def _not_enough(evidence: Evidence) -> str:
         return f"too few cycles before it: {need}; those after it is taken back count, too"
     strides = f"{counted(before, 'gait cycle')} before, {after} since"
     return f"too early to judge it: {strides}; it takes {FEWEST} of each leg, before and since"
+
+
+def verdict_takes(station: Station) -> tuple[str, ...]:
+    """Return how long a trial takes to be judged at this cadence; nothing where nobody walks."""
+    gait = station.processing.derived().gait
+    if not station.is_live or not gait.walking or not gait.cadence_spm:
+        return ()
+    seconds = SETTLE_NS / 1e9 + FEWEST * 2 * 60.0 / gait.cadence_spm
+    said = f"a verdict takes about {seconds:.0f} s"
+    return f"{said}: {FEWEST} cycles of each leg", said
 
 
 def ends(trial: Trial) -> str:

@@ -26,6 +26,7 @@ from server_gui.core.tuning.comparison import open_file, save_file, staged_as
 from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.several_joints import Offer
 from server_gui.core.tuning.writing import WriteProgress, WriteState
+from server_gui.views.edits.trial_words import verdict_takes
 from server_gui.views.marks import time_of_day
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
@@ -41,6 +42,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
+NOT_KNOWN: Final = "Whether drives are enabled is not known now."
 ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
 NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
 STORING: Final = "Make a device keep its parameters without power; a separate step"
@@ -353,6 +355,7 @@ class ParametersPanel(QWidget):
         now = station.difference(self._desk.shown.units)
         if (now, _acts(station)) != (self.review.changes, self.review.acts):
             self.review.show_changes(now, _acts(station))
+        self.review.say_how_long(*verdict_takes(station))
         if not now:
             self.pages.setCurrentIndex(EDIT)
 
@@ -388,8 +391,12 @@ def _dated(writing: WriteProgress) -> tuple[str, str]:
 def _acts(station: Station) -> str:
     """Return what is written to acts on, where somebody may stand in it."""
     if not station.is_live:
-        return "Whether drives are enabled is not known now."
-    return ACTS if any_enabled(station.robot) else ""
+        return NOT_KNOWN
+    if any_enabled(station.robot):
+        return ACTS
+    robot = station.robot
+    are_known = all(robot.word(f"{joint}.state") is not None for joint in robot.names("joint"))
+    return "" if are_known else NOT_KNOWN
 
 
 def _close_file(station: Station) -> None:
