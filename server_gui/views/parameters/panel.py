@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -45,6 +45,7 @@ EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no 
 NOT_KNOWN: Final = "Whether drives are enabled is not known now."
 ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
 NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
+REVIEW_WIDE: Final = 95  # its button with a number of two digits, at text of 100 %
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
 
@@ -54,7 +55,9 @@ class ParametersPanel(QWidget):
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
+        self._theme = theme
         self._problem = ""
+        self._is_short = self._is_in_two = False
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk, theme), Review(theme)
@@ -118,11 +121,28 @@ class ParametersPanel(QWidget):
         for button in self._seldom:
             button.setVisible(not is_short)
         self.detail.be_short(is_short)
+        self._is_short = is_short
+        self._below.setMinimumWidth(1 if is_short else 0)  # narrower, they are in two rows
+        self._place_buttons()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_buttons()
+
+    def _place_buttons(self) -> None:
+        """Put all in one row where they have room: below each other they take that of the tree and the card."""
+        grid, margins = self._buttons_grid, self.contentsMargins()
+        needed = sum(one.sizeHint().width() for one in (self.undo, self._discard, self.more))
+        wide = needed + 3 * grid.horizontalSpacing() + self._theme.px(REVIEW_WIDE) + 16
+        in_two = self._is_short and self.width() - margins.left() - margins.right() < wide
+        if in_two is self._is_in_two:
+            return
+        self._is_in_two = in_two
         for button in (self.review_button, self.more):
-            self._buttons_grid.removeWidget(button)
-        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[is_short]
+            grid.removeWidget(button)
+        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[in_two]
         for button, (row, column) in zip((self.review_button, self.more), place, strict=True):
-            self._buttons_grid.addWidget(button, row, column)
+            grid.addWidget(button, row, column)
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
