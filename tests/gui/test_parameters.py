@@ -202,7 +202,9 @@ def test_a_trial_is_what_is_meant_unless_every_drive_is_known_to_be_off(
     panel.stage_text("gait.step_length", "430")
     panel.begin_review()
     review = panel.review
-    assert [one.text() for one in (review.try_it, review.write_it) if one.objectName() == "primary"] == [leads]
+    assert [one.text() for one in (review.try_it, review.write_it) if one.objectName() == "primary"] == [
+        leads
+    ]
 
 
 def test_a_review_says_how_long_a_verdict_takes_only_while_somebody_walks(

@@ -30,6 +30,7 @@ from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
 from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import record, what, whole
+from server_gui.core.tuning.edits import spoken
 from server_gui.views.experiments.form import ExperimentForm, Tried
 from server_gui.views.experiments.response_plot import ResponsePlot
 from server_gui.views.theme import Theme
@@ -263,7 +264,7 @@ class Edits(QWidget):
     def _what(self, told: EditEvidence) -> str:
         """Return the changed parameters, in their units."""
         if told.experiment is None:
-            return changes(told.edit, self._units.get(told.edit.id, {}))
+            return changes(told.edit, self._units.get(told.edit.id, {}), spoken)
         return f"{what(told)} {told.experiment.unit}".rstrip()
 
     def _line(self, told: EditEvidence) -> str:

@@ -9,7 +9,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
 from server_gui.core.evidence.edits import SETTLE_NS
 from server_gui.core.evidence.wording import share
-from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.edits import spoken, unit_of
 from server_gui.core.tuning.writing import Trial
 
 TO_AB: Final = "Take it back now, and ask about an A/B trial of both values"
@@ -18,7 +18,7 @@ UNLIKE: Final = "too few strides before and after are comparable"
 
 
 def changes(station: Station, trial: Trial, units: Units) -> list[str]:
-    """Return each value with the one from before: `gait step length 400 → 430 mm`."""
+    """Return each value with the one from before: `step length (gait) 400 → 430 mm`."""
     return [f"{name} {values}" for name, values in _changes(station, trial, units)]
 
 
@@ -102,5 +102,5 @@ def _changes(station: Station, trial: Trial, units: Units) -> list[tuple[str, st
         before = trial.before.get(name)
         old = "?" if before is None else unit.editable(before)
         values = f"{old} → {unit.editable(value)} {unit.symbol}".rstrip()
-        found.append((name.replace("_", " ").replace(".", " "), values))
+        found.append((spoken(name), values))
     return found
