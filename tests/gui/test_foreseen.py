@@ -87,20 +87,22 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     window: Parts, station: Station
 ) -> None:
     station.take_prediction(predicted("walk", WALKS))
-    said = f"{UNCHECKED} · else turn 4 %"
-    shown(window, lambda: chip(window) == f"Walk 94 %\npredicted · {said}")
+    said = f"predicted, {UNCHECKED} · else turn 4 %"
+    shown(window, lambda: chip(window) == f"Walk\n{said}")
+    assert window.header._chips["status"]._words.parts == ("not checked", "predicted")
     now = window.overview.now.activity
-    shown(window, lambda: now.main.text().startswith("Walk 94 %  "))
+    shown(window, lambda: now.main.text().startswith("Walk  "))
     assert now.detail.text() == said
     assert re.search(r"Activity of [^\n]+, activity-3fa2c1", now.toolTip())
     assert "activity-3fa2c1" not in now.main.text() + now.detail.text(), "nobody reads a model's hash"
-    assert window.overview._ring._word == "Walk 94 %"
+    assert window.overview._ring._word == "Walk", "94 % looks like how often it is right"
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {})
     station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
     line = activity(station)
+    assert line.text == "Walk 94 %"
     assert line.detail == "right 94 % last week (312 checked) · else turn 4 %"
     assert line.short == "right 94 % last week"
     assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled" in line.tip
@@ -143,7 +145,7 @@ def test_a_fall_stands_before_all_else(station: Station) -> None:
     station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
     line = status(station)
     assert line is not None
-    assert line.text == "Walk 94 %"
+    assert line.text == "Walk"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None
@@ -169,7 +171,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
     station.take_prediction(predicted("walk", {"walk": 1.0}))
     window.header.refresh()
     assert "doubtful" not in window.header._chips["status"]._words.parts
-    assert doing(station)[0].startswith("Walk 100 % 120 steps/min · ")
+    assert doing(station)[0].startswith("Walk 120 steps/min · ")
 
 
 @pytest.mark.parametrize(
@@ -221,7 +223,7 @@ def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: Parts, sta
     assert activity(station).wordings[0] == "Not judged · nothing comes from left knee"
     shown(window, lambda: chip(window).startswith("Not judged"))
     station.take_prediction(predicted("walk", WALKS))
-    assert activity(station).text == "Walk 94 %"
+    assert activity(station).text == "Walk"
 
 
 def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: Station) -> None:
@@ -235,6 +237,21 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: St
     assert isinstance(newest, NewestPrediction)
     assert window.overview._ring._word == "Walk"
     assert doing(station)[0].startswith("Walk 120 steps/min · ")
+
+
+def test_what_keeps_a_model_from_predicting_is_said_beside_the_steps(station: Station) -> None:
+    assert activity(station).detail == "from the steps seen; model not ready yet"
+    said = predicted("walk", WALKS)
+    card = msgspec.structs.replace(said.card, channels=("left_knee.position", "right_knee.position"))
+    station.take_prediction(dataclasses.replace(said, card=card))
+    newest = station.predictions.by_task["activity"]
+    old = dataclasses.replace(newest, came_ns=time.monotonic_ns() - 5 * 10**9)
+    station.predictions.by_task["activity"] = old
+    assert activity(station).detail == "from the steps seen; the model predicts nothing now"
+    station.take([looked(state="lost", problem="its heartbeat is missing")])
+    assert activity(station).detail == "from the steps seen; the model needs the left knee"
+    station.take_prediction(Serves("exo-01", {}, {"activity": "no model serves activity"}))
+    assert activity(station).detail == "from the steps seen, without a model"
 
 
 def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(window: Parts, station: Station) -> None:

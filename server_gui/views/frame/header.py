@@ -245,6 +245,7 @@ def _status(station: Station) -> Words:
     if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         parts = ("doubtful", "predicted") if line.is_doubtful else parts
+        parts = ("not checked", "predicted") if line.is_unchecked else parts
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, problem, seen = (
         station.processing.derived().gait,
