@@ -288,9 +288,9 @@ def test_a_trial_with_too_few_strides_is_tried_again_by_way_of_the_review(
 
 def test_strides_that_are_too_few_are_dashed_and_said_to_be(bench: Bench, parts: Parts) -> None:
     one = worse()
-    for cycles in (8, 7):
-        after = Side((0.2,) * 101, (0.01,) * 101, cycles)
+    for count in (8, 7):
+        after = Side((0.2,) * 101, (0.01,) * 101, count)
         curves = tuple(Curves(each.channel, each.before, after) for each in one.curves)
         bench.station.judged.take(replace(one, curves=curves))
         parts.edits.refresh()
-        assert ("dashed where there are fewer than 8 strides" in parts.edits._legend.text()) is (cycles < 8)
+        assert ("dashed where there are fewer than 8 strides" in parts.edits._legend.text()) is (count < 8)

@@ -12,6 +12,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
+from server_gui.core.alarms.severity import colour_of
 from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import Load, Sole, loads, sole
@@ -296,7 +297,8 @@ class Overview(QWidget):
         if slow:
             self._model.refresh()
             self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
-            self.sections.say([joint for joint, _ in self._model.errors], self._table.tone)
+            joints = [joint for joint, _ in self._model.errors]
+            self.sections.say({Section.JOINTS: (joints, self._table.tone), Section.WEARER: _unwell(station)})
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots
@@ -425,6 +427,15 @@ class Overview(QWidget):
         sources = "; ".join(dict.fromkeys(known.source for known in self._soles.values()))
         count = f"{max(known.count for known in self._soles.values())} cells"
         self._pressure.set_note(*((sources, count, "") if live else old_text(station)))
+
+
+def _unwell(station: Station) -> tuple[list[str], str]:
+    """Return what of the wearer's sensors is not well, and how bad that is."""
+    joints = station.robot.names("joint")
+    names = [part.name for part in station.robot.not_ok() if part.name not in joints]
+    shown = [name for name in names if name.endswith("_insole") or name == "trunk"]
+    colours = {colour_of(name, station.alarms) for name in shown}
+    return [name.replace("_", " ") for name in shown], "bad" if "bad" in colours else "warn"
 
 
 def legs_of(station: Station) -> tuple[str, ...]:

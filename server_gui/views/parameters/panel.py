@@ -130,7 +130,7 @@ class ParametersPanel(QWidget):
         self._place_buttons()
 
     def _place_buttons(self) -> None:
-        """Put all in one row where they have room: below each other they take that of the tree and the card."""
+        """Put all in one row where they have room: else they take that of the tree and the card."""
         grid, margins = self._buttons_grid, self.contentsMargins()
         needed = sum(one.sizeHint().width() for one in (self.undo, self._discard, self.more))
         wide = needed + 3 * grid.horizontalSpacing() + self._theme.px(REVIEW_WIDE) + 16
