@@ -46,6 +46,7 @@ OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
+NOT_NAMED: Final = "Wearer not named"
 PREDICTED: Final = "predicted"
 UNSEEN: Final = "not judged"  # for the model does not see all
 
@@ -220,6 +221,19 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         yield _learning(adapting)
 
 
+def most_needed(rows: list[PredictionRow]) -> list[PredictionRow]:
+    """Leave out that the wearer has no name where something is wrong that needs the line."""
+    is_wrong = any(row.mark.colour in ("bad", "warn") for row in rows)
+    return [row for row in rows if not (is_wrong and row.text == NOT_NAMED)]
+
+
+def instead_of_insoles(station: Station) -> list[str]:
+    """Return what a leg's steps are detected by where its insole is silent: `left by its joints`."""
+    silent = (part.name for part in station.robot.not_ok())
+    told = ((name.partition("_")[0], _steps_by(station, name)) for name in silent)
+    return [f"{leg} {by.removeprefix('steps ')}" for leg, by in told if by]
+
+
 def _steps_by(station: Station, part: str) -> str:
     """Return what a leg's steps are detected by while its insole is silent; empty of other parts."""
     side, _, kind = part.partition("_")
@@ -232,7 +246,7 @@ def _learning(adapting: Adapting) -> PredictionRow:
     """Return the progress of learning from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
-        AdaptationState.UNNAMED: ("Wearer not named", adapting.text),
+        AdaptationState.UNNAMED: (NOT_NAMED, adapting.text),
         AdaptationState.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
         AdaptationState.LEARNING: ("Learning", whom),
         AdaptationState.TRYING: (

@@ -22,7 +22,19 @@ from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import activity, doing, lines, model_phases, status, step_phases
+from server_gui.views.marks import Mark
+from server_gui.views.predictions import (
+    NOT_NAMED,
+    PredictionRow,
+    activity,
+    doing,
+    instead_of_insoles,
+    lines,
+    model_phases,
+    most_needed,
+    status,
+    step_phases,
+)
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
@@ -363,3 +375,7 @@ def test_of_a_lost_insole_it_is_said_by_what_its_leg_s_steps_are_seen(
     (line,) = (row for row in lines(station) if row.text.startswith("left insole"))
     assert line.detail == "it went away · steps by its joints"
     assert "left insole: lost · steps by its joints" in line.wordings
+    assert instead_of_insoles(station) == ["left by its joints"]
+    unnamed = PredictionRow(Mark("ring", "dim", "unnamed"), NOT_NAMED)
+    assert most_needed([line, unnamed]) == [line], "what is worse needs the line"
+    assert most_needed([unnamed]) == [unnamed]
