@@ -29,6 +29,7 @@ MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
 MOST_LOST_PERCENT: Final = 1.0  # of the cycle, of a person's error
 MOST_ABSTAINED: Final = 0.1  # more than the serving model
 NONE_SERVES: Final = "not compared with another: no promoted model serves yet"
+FEW_JUDGES: Final = 2
 NAMED: Final = 3  # channels that are told
 WITHIN: Final = 0.1  # of the cycle: a phase that is right
 
@@ -117,9 +118,17 @@ def _without_serving(task: Task, held_out: Judged, figure: str, lacking: Sequenc
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     knows = new > idle if task.fold else new < idle
     ours, its = _percents(task, new, idle)
-    told = f"{figure} {ours} on wearers it has not seen (always guessing the same: {its})"
+    told = f"{figure} {ours} on {_judges(held_out)} (always guessing the same: {its})"
     verdict = Verdict.NOT_COMPARED if knows else Verdict.NOT_BETTER
     return Decision(verdict, (told, _unable(lacking) if lacking else NONE_SERVES))
+
+
+def _judges(found: Judged) -> str:
+    """Return whom it was judged by: one or two by name, as their figure says less of others."""
+    who = sorted(found.people)
+    if not 0 < len(who) <= FEW_JUDGES:
+        return "wearers it has not seen"
+    return f"{' and '.join(who)} alone, whom it has not seen"
 
 
 def _unable(lacking: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 from PySide6.QtWidgets import QApplication
@@ -62,10 +63,10 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     show(view, bench, BUS)
     assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
     assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
-    knee = ["2", "left knee", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
+    knee = ["2", "left knee", "", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
     assert row(view, 0) == knee, "nothing new comes from the robot"
-    assert row(view, 1)[:5] == ["–", "SYNC", "", "10 %", "100"]
-    assert row(view, 2)[:5] == ["–", "gateway or filtered", "", "1 %", "10"]
+    assert row(view, 1)[:6] == ["–", "SYNC", "", "", "10 %", "100"]
+    assert row(view, 2)[:6] == ["–", "gateway or filtered", "", "", "1 %", "10"]
     assert not view.said.isVisible()
 
 
@@ -91,6 +92,16 @@ def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     bench.station.take([walking(1)])
     show(view, bench, BUS)
     assert view.cards[0]._icon.accessibleName() == "ok"
+
+
+def test_the_load_of_the_last_minutes_is_drawn_with_its_peak(view: BusHealthView, bench: Bench) -> None:
+    for second, load in enumerate((20.0, 85.0, None, 30.0)):
+        bench.station.take([BusesSeen((replace(BUS, load_percent=load),), second * 1_000_000_000)])
+    past = bench.station.processing.bus_loads.recent("main")
+    assert past[:, 1][[0, 1, 3]].tolist() == [20.0, 85.0, 30.0]
+    assert np.isnan(past[2, 1]), "what was not told is a gap"
+    show(view, bench, replace(BUS, load_percent=30.0))
+    assert view.cards[0]._past.note == "peak 85 %"
 
 
 def test_what_is_not_known_is_no_card_and_no_zero(view: BusHealthView, bench: Bench) -> None:
@@ -169,7 +180,7 @@ def test_page_and_last_line_give_one_fact_one_severity(
     bar.refresh()
     lost_mark = TEXTS[Kind.LOST].mark
     assert bar._bus_icon.mark == view.cards[0]._icon.mark == lost_mark, "one state has one mark"
-    assert row(view, 0)[2] == "✕ lost"
+    assert row(view, 0)[STATE] == "✕ lost"
     assert bar.bus.text() == "CAN main 41 %: lost left knee"
 
 

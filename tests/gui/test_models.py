@@ -172,6 +172,8 @@ def test_classes_that_would_be_lost_stand_out_before_a_promotion_and_beside_the_
     choose(shown, page, other)
     click(page.promote)
     shown.until(page.confirm.isVisible, "asked")
+    assert page.confirm.yes.text() == "Promote without these classes"
+    assert (page.confirm.yes.objectName(), page.confirm.no.objectName()) == ("", "primary")
     for said in (page.confirm.warning, page.compare.warning):
         assert said.isVisible()
         assert said.text() == "▲ It does not know stairs."
@@ -233,8 +235,15 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     page = whole.window.tabs.models
     click(page.new)
     whole.until(lambda: "Nobody is chosen" in page.form.said.text(), "said what is labelled")
-    (judge,) = page.form.judges.findItems("s3", Qt.MatchFlag.MatchExactly)
-    judge.setCheckState(0, Qt.CheckState.Checked)
+    judges = page.form.judges
+    (judge,) = judges.findItems("s3", Qt.MatchFlag.MatchExactly)
+    middle = judges.visualItemRect(judge).center()
+    for turned in (True, False, True):
+        QTest.mouseClick(judges.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+        assert (judges.chosen == ("s3",)) is turned, "its whole row is what is clicked"
+    QTest.keyClick(judges, Qt.Key.Key_Space)
+    assert judges.chosen == ()
+    QTest.keyClick(judges, Qt.Key.Key_Space)
     whole.until(lambda: "Judged by s3" in page.form.said.text(), "said by whom it is judged")
     click(page.form.begin)
     (job,) = archive.models.jobs.jobs
@@ -253,7 +262,7 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert job.said not in page.compare.notes.text(), "it is said once"
     assert not {"▼ worse", "▲ better"} & set(itertools.chain.from_iterable(figures(page).values()))
     assert not page.form.isVisible(), "what came of it is looked at next"
-    assert " % on wearers it has not seen (always guessing the same: " in page.said.text()
+    assert " % on s3 alone, whom it has not seen (always guessing the same: " in page.said.text()
     assert registry.history("activity") == []
 
 

@@ -1,5 +1,6 @@
 """Resources: asked for only while they are looked at; the table keeps what people have done to it."""
 
+import dataclasses
 import re
 import time
 from collections.abc import Iterator
@@ -209,6 +210,17 @@ def test_disk_network_heat_and_who_uses_the_cpu_are_shown_over_time(view: Resour
         ("gait_ctrl", "40.0"),
         ("&lt;b&gt;", "5.0"),
     ]
+
+
+def test_a_computer_without_a_sensor_of_heat_has_no_empty_card(view: Resources, bench: Bench) -> None:
+    bench.station.take([resources()])
+    for thermal, is_there in (({}, False), ({"core": 61.5}, True)):
+        seen = resources([use("gait_ctrl", 1, 10.0)])
+        bench.station.take([dataclasses.replace(seen, snapshot=replace(seen.snapshot, thermal=thermal))])
+        view.read_now()
+        view.refresh()
+        assert view.temperature.isVisible() is is_there
+        assert (view._grid.indexOf(view.temperature) >= 0) or not is_there
 
 
 def test_what_holds_the_cores_back_is_told(bench: Bench) -> None:

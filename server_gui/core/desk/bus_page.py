@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.wire.bus import BusInfo, NodeInfo
@@ -12,12 +12,13 @@ from server_gui.core.alarms.marks import NOT_KNOWN, STATES, Mark, age_text
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.follow.missing_pdos import told_percent
 from server_gui.core.follow.robot import FollowedComponent
-from server_gui.core.processing.bus_health import BusHealthLevel, findings, node_level
+from server_gui.core.processing.bus_health import BusHealthLevel, findings, node_level, of_load, rated
 from server_gui.core.processing.bus_senders import Talking, kinds, talking, total, whole_numbers
 
 UNKNOWN: Final = "–"
 FEW: Final = 2  # lines of one kind
 BEFORE: Final = "silent by now"  # names the frames of the last second that are of nodes without a number
+FILLS: Final = "most of the load"
 SILENT: Final = frozenset({"lost", "stale"})
 UNANSWERED, FEW_PDOS = "no SDO answer", "PDOs missing"
 _HEARTBEAT: Final = re.compile(r"heartbeat has been missing for (\d+(?:\.\d+)? \w+)")
@@ -37,6 +38,7 @@ class Row:
     trips: str
     unanswered: str
     missing: str
+    ids: str = ""
 
     @property
     def colour(self) -> str:
@@ -61,7 +63,8 @@ def rows(bus: BusInfo, parts: Mapping[str, FollowedComponent], alarms: Alarms, *
     made = []
     for talk, number in zip(loud, numbers, strict=False):
         node = nodes.get(-1 if talk.node_id is None else talk.node_id)
-        made.append(_row(talk.node_id, node, talk, str(number), _mark(node, talk, alarms, live=live)))
+        row = _row(talk.node_id, node, talk, str(number), _mark(node, talk, alarms, live=live))
+        made.append(_blamed(row, bus) if talk is senders[0] else row)
     for node_id, node in nodes.items():
         if node_id in silent or node_id not in by_node:
             words = silent.get(node_id, UNKNOWN)
@@ -173,32 +176,49 @@ def _row(
     share = UNKNOWN if talk is None else f"{100 * talk.share:.0f} %"
     sends = "" if talk is None else ", ".join(f"{kind} {rate:.0f}/s" for kind, rate in talk.kinds)
     if node is None:
-        name = "not in the file" if node_id is not None else talk.who if talk else ""
-        ids = f" {talk.ids}" if talk is not None and talk.ids else ""
         return _nameless(
-            f"{name}{ids}",
+            "not in the file" if node_id is not None else (talk.who if talk else ""),
             share,
             frames,
             "" if node_id is None else str(node_id),
             sends if node_id is not None else "",
+            "" if talk is None else talk.ids,
         )
     names = ", ".join(name.replace("_", " ") for name in node.components)
     is_silent = frames != UNKNOWN and not frames.isdigit()
+    if mark is not None and "silent" in mark.word:
+        frames = frames.replace("silent ", "for ")  # its state says so already
     trips = UNKNOWN
     if node.sdo_p50_ms is not None and not is_silent:
         trips = f"{node.sdo_p50_ms:.1f} / {node.sdo_max_ms or 0.0:.1f} ms"
     percent = told_percent(node) or node.pdos_missing_percent  # what is told of it stands in its row, too
     is_known = percent is not None and not is_silent and (percent > 0.0 or talk is not None)
     missing = f"{percent:.1f} %" if is_known else UNKNOWN
-    return Row(str(node_id), names, mark, share, frames, sends, trips, str(node.sdo_timeouts), missing)
+    ids = "" if talk is None else talk.ids
+    return Row(str(node_id), names, mark, share, frames, sends, trips, str(node.sdo_timeouts), missing, ids)
 
 
-def _nameless(name: str, share: str, frames: str, node: str, sends: str = "") -> Row:
-    return Row(node or UNKNOWN, name, None, share, frames, sends, UNKNOWN, UNKNOWN, UNKNOWN)
+def _nameless(name: str, share: str, frames: str, node: str, sends: str = "", ids: str = "") -> Row:
+    return Row(node or UNKNOWN, name, None, share, frames, sends, UNKNOWN, UNKNOWN, UNKNOWN, ids)
 
 
-def _order(row: Row) -> tuple[int, float, bool, int]:
-    """Order the worst first; of those that are as bad the largest share, and the lowest node."""
+def _blamed(row: Row, bus: BusInfo) -> Row:
+    """Mark the largest sender of a bus with too much load, where nothing worse is known of it."""
+    load = next((one for one in rated(bus) if of_load(one)), None)
+    if load is None or row.colour in _WORST:
+        return row
+    is_full = load[0] is BusHealthLevel.ALARM
+    return replace(row, mark=Mark(*(("square", "bad") if is_full else ("triangle", "warn")), FILLS))
+
+
+def _order(row: Row) -> tuple[int, bool, bool, float, bool, int]:
+    """Order the worst first; of equals what fills the bus, who is silent, then the largest share."""
     bad = _WORST.index(row.colour) if row.colour in _WORST else len(_WORST)
     share = 0.0 if row.share == UNKNOWN else float(row.share.removesuffix(" %"))
-    return bad, -share, row.node == UNKNOWN, 0 if row.node == UNKNOWN else int(row.node)
+    fills = row.mark is not None and row.mark.word == FILLS
+    is_silent = row.frames != UNKNOWN and not row.frames.isdigit()
+    return bad, not fills, not is_silent, -share, row.node == UNKNOWN, _number(row.node)
+
+
+def _number(node: str) -> int:
+    return 0 if node == UNKNOWN else int(node)

@@ -10,7 +10,7 @@ from gateway.units import with_minus
 from ml.registry.card import Card, Metrics
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.names import class_name
-from server_gui.core.prediction.state import WITHIN_DAYS
+from server_gui.core.prediction.state import WITHIN_DAYS, Quality
 
 OTHERS: Final = "other sessions"  # the verdict where each was judged by its own
 UNKNOWN: Final = "not labelled"
@@ -35,6 +35,7 @@ FIGURES: Final[Mapping[str, Figure]] = {
     "covered": Figure("The truth is among what it names", 100.0, True),
     "worst_subject_covered": Figure("The same, for the worst wearer", 100.0, True),
 }
+OF_WORST: Final = "worst_"  # how a figure's name begins that is of one of several wearers
 F1: Final = Figure("F1", 100.0, True)
 CALIBRATION: Final = Figure("Probabilities are off by", 100.0, False)
 
@@ -103,14 +104,31 @@ def last_week(entry: Entry) -> str:
     """Return the share of its recent correct predictions, in words; without labels, no number."""
     if not entry.hits:
         return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
-    return "; ".join(f"{robot}: {quality.text}" for robot, quality in sorted(entry.hits.items()))
+    return "; ".join(
+        f"{robot}: {quality.text}{_but(entry, quality)}" for robot, quality in sorted(entry.hits.items())
+    )
 
 
 def week_short(entry: Entry) -> str:
     """Return the same for a narrow place."""
-    return (
-        ", ".join(f"{robot} {quality.shares[0]}" for robot, quality in sorted(entry.hits.items())) or UNKNOWN
-    )
+    told = [(robot, _week_of(entry, quality)) for robot, quality in sorted(entry.hits.items())]
+    return told[0][1] if len(told) == 1 else ", ".join(f"{robot} {said}" for robot, said in told) or UNKNOWN
+
+
+def _week_of(entry: Entry, quality: Quality) -> str:
+    """Return how right it was; where all labels are of one class that proves nothing of the others."""
+    if len(quality.confusion) == 1 and len(entry.card.classes) > 1:
+        return f"only {class_name(next(iter(quality.confusion)))} labelled"
+    right = quality.shares[0]
+    return right if "of" in right else f"{right} of {quality.labelled}"
+
+
+def _but(entry: Entry, quality: Quality) -> str:
+    """Return which classes were not among the labels, so that nothing is known of them."""
+    if not quality.confusion:
+        return ""
+    missing = [class_name(name) for name in entry.card.classes if name not in quality.confusion]
+    return f"; none of it labelled {', '.join(missing)}" if missing else ""
 
 
 def usual_other(entry: Entry, found: Catalogue) -> Entry | None:
@@ -146,6 +164,11 @@ def headline(card: Card) -> str:
 def _overall(mine: Metrics, its: Metrics) -> Iterator[Row]:
     for name, figure in FIGURES.items():
         one, other = (_scaled(metrics.figures.get(name), figure) for metrics in (mine, its))
+        if name.startswith(OF_WORST):  # of one wearer alone it is the figure above once more
+            one, other = (
+                value if len(metrics.per_subject) > 1 else None
+                for value, metrics in ((one, mine), (other, its))
+            )
         if one is not None or other is not None:
             yield Row("On people never seen", figure.words, one, other, figure.more_is_better)
     one, other = (_scaled(metrics.calibration_error, CALIBRATION) for metrics in (mine, its))

@@ -14,7 +14,7 @@ OWN_KINDS: Final = frozenset({"EMCY", "TPDO", "SDO answer", "heartbeat"})  # tha
 OTHER: Final = "other"  # of no kind that CiA 301 names
 NOBODY: Final = "no known node"
 REST: Final = "gateway or filtered"  # names the frames that did not come to the gateway
-MOST_IDS: Final = 4  # of a sender that are named
+MOST_IDS: Final = 4  # that are named one by one; of a kind and node the gateway names no more
 NOISE: Final = 1.0  # frames/s: so much the rounding of each kind may add up to
 FEWER: Final = "send fewer PDOs or SYNC less often"
 
@@ -32,12 +32,16 @@ class Talking:
     share: float  # 0–1
     kinds: tuple[tuple[str, float], ...]
     name: str = ""
-    identifiers: tuple[int, ...] = ()  # with the most frames, with SocketCAN's flags; only the first are told
+    identifiers: tuple[int, ...] = ()  # with the most frames, with SocketCAN's flags
+    has_more: bool = False  # perhaps: the gateway names but the first of each kind and node
 
     @property
     def ids(self) -> str:
-        """Name the identifiers for people, of 29 bits with eight digits."""
-        return ", ".join(map(_hex, self.identifiers))
+        """Name the identifiers, of 29 bits with eight digits; of many the lowest and the highest."""
+        known = sorted(self.identifiers)
+        if len(known) > MOST_IDS:
+            return f"{_hex(known[0])} … {_hex(known[-1])}"
+        return ", ".join(map(_hex, known)) + (", …" if self.has_more else "")
 
     @property
     def who(self) -> str:
@@ -82,10 +86,13 @@ def talking(bus: BusInfo) -> list[Talking]:
     whole = total(bus) or 0.0
     found: dict[tuple[int | None, str], dict[str, float]] = {}
     identifiers: dict[tuple[int | None, str], list[int]] = {}
+    cut: set[tuple[int | None, str]] = set()
     for one in bus.talks:
         node_id = one.node_id if one.kind in OWN_KINDS or one.kind == OTHER else None
         name = "" if node_id is not None else NOBODY if one.kind == OTHER else one.kind
         identifiers.setdefault((node_id, name), []).extend(one.identifiers)
+        if len(one.identifiers) >= MOST_IDS:
+            cut.add((node_id, name))
         sends = found.setdefault((node_id, name), {})
         sends[one.kind] = sends.get(one.kind, 0.0) + one.frames_per_s
     if rest := _rest(bus):
@@ -98,7 +105,8 @@ def talking(bus: BusInfo) -> list[Talking]:
             rate / whole if whole else 0.0,
             tuple(sorted(sends.items(), key=lambda item: -item[1])),
             name,
-            tuple(identifiers.get((node_id, name), ())[:MOST_IDS]),
+            tuple(dict.fromkeys(identifiers.get((node_id, name), ()))),
+            (node_id, name) in cut,
         )
         for (node_id, name), sends in found.items()
     ]

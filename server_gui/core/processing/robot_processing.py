@@ -3,7 +3,17 @@
 import time
 
 from gateway.wire.robot import Description
-from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Refused, Resources, Telemetry
+from server_gui.core.follow.events import (
+    BusesSeen,
+    Described,
+    Event,
+    LinkChanged,
+    Looked,
+    Refused,
+    Resources,
+    Telemetry,
+)
+from server_gui.core.processing.bus_loads import BusLoads
 from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.processing.component import ComponentProcessing, Derived
 from server_gui.core.processing.resource import ResourceProcessing
@@ -20,6 +30,7 @@ class RobotProcessing:
         self.component = ComponentProcessing()
         self.resource = ResourceProcessing()
         self.communication = LinkMonitor()
+        self.bus_loads = BusLoads()
         self._boot_id: str | None = None
 
     def apply(self, event: Event) -> None:
@@ -31,6 +42,8 @@ class RobotProcessing:
             case Resources():
                 self.resource.take(event.snapshot)
                 self.communication.round_trip(event.round_trip_ns)
+            case BusesSeen():
+                self.bus_loads.take(event.buses, event.at_ns)
             case LinkChanged():
                 self.communication.state(event.state, event.problem, event.at_ns)
             case Looked():

@@ -25,7 +25,6 @@ class Confirm(Card):
         self.why.setPlaceholderText("Why: kept in the history")
         self.why.setAccessibleName("Why this is changed")
         self.yes, self.no = QPushButton(), QPushButton("Change nothing")
-        self.yes.setObjectName("primary")
         self.yes.clicked.connect(lambda: self._models.confirm(self.why.text().strip()))
         self.no.clicked.connect(models.forget)
         row = QHBoxLayout()
@@ -50,6 +49,15 @@ class Confirm(Card):
             set_text(self.words, "\n".join(change.sentences))
             set_text(self.warning, f"▲ {change.lost}")
             self.warning.setVisible(bool(change.lost))
-            self.yes.setText("Roll back" if change.is_rollback else "Promote")
+            self.yes.setText(_does(change))
+            for button, is_usual in ((self.yes, not change.lost), (self.no, bool(change.lost))):
+                button.setObjectName("primary" if is_usual else "")
+                button.style().polish(button)
             self.why.clear()
             self.no.setFocus()
+
+
+def _does(change: ModelChange) -> str:
+    """Return what is done; of what loses classes, that it does."""
+    does = "Roll back" if change.is_rollback else "Promote"
+    return f"{does} without these classes" if change.lost else does

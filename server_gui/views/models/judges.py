@@ -3,7 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QTreeWidget, QTreeWidgetItem
 
 from gateway.plain_text import plain
@@ -29,6 +29,8 @@ class Judges(QTreeWidget):
         self.setRootIsDecorated(False)
         self.setUniformRowHeights(True)
         columns.prepare(self)
+        self.itemClicked.connect(self._turn)
+        self.itemActivated.connect(self._turn)
         self.show_lessons(Lessons())
 
     @property
@@ -61,10 +63,22 @@ class Judges(QTreeWidget):
         item.setData(LABELLED, Qt.ItemDataRole.ToolTipRole, tip(lesson.said))
         if not lesson.is_named:
             item.setData(NAME, Qt.ItemDataRole.ToolTipRole, tip(NAMELESS))
+        item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsUserCheckable)  # its whole row is what is clicked
         if lesson.why_not:
-            item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsUserCheckable & ~Qt.ItemFlag.ItemIsEnabled)
+            item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEnabled)
         else:
             item.setCheckState(NAME, Qt.CheckState.Checked if checked else Qt.CheckState.Unchecked)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        item = self.currentItem()
+        if event.key() == Qt.Key.Key_Space and item is not None:
+            self._turn(item)
+        else:
+            super().keyPressEvent(event)
+
+    def _turn(self, item: QTreeWidgetItem) -> None:
+        if item.flags() & Qt.ItemFlag.ItemIsEnabled:
+            item.setCheckState(NAME, Qt.CheckState.Unchecked if _is_checked(item) else Qt.CheckState.Checked)
 
     def _items(self) -> list[QTreeWidgetItem]:
         found = (self.topLevelItem(place) for place in range(self.topLevelItemCount()))

@@ -31,7 +31,9 @@ EMPTY: Final = (
 
 PROMOTES: Final = "Let the selected model serve, after showing the change"
 ROLLS_BACK: Final = "Return to the previous model, after showing the change"
+TRAINS: Final = "Choose what to learn and who judges it; nothing serves another model before it is promoted"
 UNREACHED: Final = "The store is not reached: nothing can be promoted or rolled back until it is"
+NO_LESSONS: Final = "The store is not reached: nothing can be learned from until it is"
 SHORT: Final = "as known before"
 BEFORE: Final = "store not reached: as known before"
 AWAY: Final = f"▲ The store is not reached, {AGAIN}. Below is what was known before: {{why}}"
@@ -205,6 +207,8 @@ class ModelsPage(QWidget):
         for button, does in ((self.promote, PROMOTES), (self.back, ROLLS_BACK)):
             button.setEnabled(entry is not None and not asked and is_reached)
             set_tip(button, does if is_reached else UNREACHED)
+        self.new.setEnabled(is_reached or self.new.isChecked())
+        set_tip(self.new, TRAINS if is_reached else NO_LESSONS)
         training_now = " · training" if self._models.is_training else ""
         known = "" if is_reached else f"{BEFORE} · "
         self._list.set_note(f"{known}{len(self._models.found.entries)} models{training_now}")

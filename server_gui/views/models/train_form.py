@@ -81,7 +81,8 @@ class TrainForm(Card):
         problem = "" if lessons is None else lessons.problem
         set_text(self.said, _said(lessons, self.judges.chosen))
         set_tone(self.said, "warn" if problem else "")
-        self.begin.setEnabled(not self._models.is_training)
+        is_reached = self._models.reach.problem is None
+        self.begin.setEnabled(not self._models.is_training and is_reached and lessons is not None)
 
     def _begin(self) -> None:
         task, robot = str(self.task.currentData()), str(self.robot.currentData())

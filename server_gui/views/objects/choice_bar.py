@@ -75,7 +75,10 @@ class ChoiceBar(QWidget):
         if device is not None:
             self.device.setCurrentIndex(devices.index(device))
         others = [(one.title, one.component) for one in devices if one is not device]
-        _fill(self.other, [(BY_EDS, None), *others])
+        _fill(
+            self.other,
+            [(f"compared with {title}", component) for title, component in ((BY_EDS, None), *others)],
+        )
 
     def count(self, kinds: Mapping[RowKind, Sequence[object]], *, is_reading: bool) -> None:
         """Show the number of objects of each kind, and whether all are being read."""

@@ -2,11 +2,11 @@
 
 from typing import Final
 
+import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
     QTableWidget,
     QTableWidgetItem,
@@ -29,15 +29,17 @@ from server_gui.core.processing.bus_health import (
 )
 from server_gui.core.processing.bus_senders import total
 from server_gui.views.resources.load_bar import LoadBar
+from server_gui.views.resources.trend import Floats, Trend
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.plot import css
+from server_gui.views.widgets.plot import Curve, css
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
+LEAST_LOAD: Final = 20.0  # percent: less than that is no hill
 LEVELS: Final = {
     BusHealthLevel.GOOD: Mark("disc", "good", "ok"),
     BusHealthLevel.UNKNOWN: Mark("ring", "old", "not known"),
@@ -47,6 +49,7 @@ LEVELS: Final = {
 TITLES: Final = (
     "Node",
     "Sender",
+    "Identifiers",
     "State",
     "Share",
     "Frames/s",
@@ -55,9 +58,9 @@ TITLES: Final = (
     "Unanswered",
     "PDOs missing",
 )
-NODE, SENDER, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
+NODE, SENDER, IDS, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
 # Left out in this order where there is less room, before a name is shortened.
-SPARE: Final = (SENDS, TRIPS, UNANSWERED, SHARE, MISSING, NODE, FRAMES)
+SPARE: Final = (SENDS, TRIPS, UNANSWERED, IDS, SHARE, MISSING, NODE, FRAMES)
 NUMBERS: Final = (SHARE, FRAMES, TRIPS, UNANSWERED, MISSING)
 SENDERS_HINT: Final = (
     "Each node has the frames that it sends itself. A PDO or request to a node is listed by its kind: "
@@ -76,6 +79,8 @@ class BusCard(Card):
         self._counters = WrappingLegend("Counters of the bus")
         self._controller = WrappingLegend("The gateway's CAN controller")
         self._kinds = WrappingLegend("Traffic by kind")
+        self._past = Trend(theme, "Load over time", LEAST_LOAD, symbol=" %", digits=0)
+        self._past.setObjectName("part")  # of this card: no frame of its own
         self._rows: list[Row] = []
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
@@ -91,11 +96,9 @@ class BusCard(Card):
         self.table.horizontalHeader().setSectionResizeMode(SENDER, QHeaderView.ResizeMode.Stretch)
         self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         theme.changed.connect(self._forget)
-        head = QHBoxLayout()
-        head.addWidget(self._icon)
-        head.addWidget(self.load, 1)
-        self.body.addLayout(head)
-        for part in (self._bar, self._counters, self._controller, self._kinds, self.table):
+        self.head.insertWidget(0, self._icon)  # of the bus, not of its load
+        said = (self._counters, self._controller, self._kinds)
+        for part in (self.load, self._bar, *said, self.table, self._past):
             self.body.addWidget(part)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -124,7 +127,14 @@ class BusCard(Card):
         self._kinds.say(
             [(dim, "", one) for one in (f"Frames/s by kind: {told[0]}", *told[1:])] if told else []
         )
+        self._show_past(station.processing.bus_loads.recent(bus.name), live=live)
         self._show_senders(rows(bus, station.robot.parts, alarms, live=live))
+
+    def _show_past(self, past: Floats, *, live: bool) -> None:
+        times, load = past[:, 0], past[:, 1]
+        known = load[~np.isnan(load)]
+        self._past.set_note(f"peak {known.max():.0f} %" if len(known) else "")
+        self._past.show_rows(self._past, times, [Curve("load", "accent")], [load], live=live)
 
     def _counted(self, bus: BusInfo) -> list[tuple[str, str, str]]:
         text, wrong = css(self._theme, "text"), css(self._theme, "warn")
@@ -162,7 +172,7 @@ class BusCard(Card):
         """Leave out parts without room as a whole: no number is cut, and no name while a part can go."""
         self._say_states(brief=False)
         shown = self._columns()
-        if FRAMES not in shown:  # a state's mark is enough: what it means stands above
+        if not {SHARE, MISSING, FRAMES} <= shown:  # a state's mark is enough: what it means stands above
             self._say_states(brief=True)
             shown = self._columns()
         for column in range(len(TITLES)):
@@ -226,6 +236,7 @@ def _texts(row: Row) -> tuple[str, ...]:
     return (
         row.node,
         row.name,
+        row.ids,
         _state(row),
         row.share,
         row.frames,

@@ -1,7 +1,9 @@
 """The robot's computer over time: CPU, memory, who uses them, disk, network, heat; and its processes."""
 
+from collections.abc import Mapping
 from typing import Final
 
+from msgspec import UNSET
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
@@ -75,6 +77,7 @@ class Resources(QWidget):
         self._grid = QGridLayout()
         self._cards = (self.cpu, self.memory, self.top, self.devices, self.temperature, computer)
         self._theme = theme
+        self._columns, self._is_heatless = 2, False  # no sensor of a temperature
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(8, 8, 8, 8)
         self._layout.addLayout(self._grid, 1)
@@ -94,8 +97,11 @@ class Resources(QWidget):
         self._arrange(3 if is_narrow and self.width() >= self._theme.px(THREE) else 2)
 
     def _arrange(self, columns: int) -> None:
-        for place, card in enumerate(self._cards):
-            self._grid.addWidget(card, place // columns, place % columns)
+        self._columns = columns
+        shown = [card for card in self._cards if card is not self.temperature or not self._is_heatless]
+        for place, card in enumerate(shown):
+            span = columns - place % columns if card is shown[-1] else 1
+            self._grid.addWidget(card, place // columns, place % columns, 1, span)
         for column in range(3):
             self._grid.setColumnStretch(column, int(column < columns))
 
@@ -175,9 +181,20 @@ class Resources(QWidget):
         share = 100 * memory.used / memory.total
         amount = f"{share:.0f} % · {memory.used / GIB:.2f} of {memory.total / GIB:.1f} GiB"
         self.memory.set_note(f"{old}{amount}", f"{old}{share:.0f} %", f"{old[:5]}")
+        table = station.processes
+        has_none = table is not None and table.thermal is not UNSET and not _any_known(table.thermal)
+        if has_none is not self._is_heatless:  # then others have its room
+            self._is_heatless = has_none
+            self.temperature.setVisible(not has_none)
+            self._arrange(self._columns)
         held = held_back(station.processes)
         self.temperature.set_note(held, held.partition(" · ")[0], "▲" if "▲" in held else "")
         set_text(self.facts, facts(station, seen))
+
+
+def _any_known(values: Mapping[str, float | None]) -> bool:
+    """Return whether one of these is known."""
+    return any(value is not None for value in values.values())
 
 
 def _age_s(at_ns: int | None) -> float | None:

@@ -15,6 +15,7 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 Floats = npt.NDArray[np.float64]
 LEAST_HIGH: Final = 60  # a plot, at text of 100 %: its legend leaves it so much
+OLD_S: Final = 5.0  # what has had no value for so long has none now
 SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
 
 
@@ -77,20 +78,22 @@ class Trend(Card):
             self._shown, self._rows = (source, tuple(curves)), object()
             self.plot.set_curves(curves)
         self.plot.draw(self._rows, times, columns, live=live, scale=self._scale)
-        self._say(curves, columns, live=live)
+        self._say(curves, times, columns, live=live)
 
     def _resize(self) -> None:
         if "plot" in self.__dict__:  # it has been shown
             self.plot.setMinimumHeight(self._theme.px(LEAST_HIGH))
 
-    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats], *, live: bool) -> None:
+    def _say(self, curves: Sequence[Curve], times: Floats, columns: Sequence[Floats], *, live: bool) -> None:
+        """Say the newest values; of what has none any more, as a process that has ended, none."""
         said = []
         for curve, values in zip(curves, columns, strict=True):
-            known = values[~np.isnan(values)]
-            value = f"{known[-1] * self._scale:.{self._digits}f}" if len(known) else "–"
+            known = np.flatnonzero(~np.isnan(values))
+            is_now = bool(len(known)) and times[-1] - times[known[-1]] < OLD_S
+            value = f"{values[known[-1]] * self._scale:.{self._digits}f}" if is_now else "–"
             said.append(
                 (
-                    css(self._theme, curve.colour if live else "old"),
+                    css(self._theme, curve.colour if live and is_now else "old"),
                     "━",
                     f"{curve.channel} {value}{self._symbol}",
                 )

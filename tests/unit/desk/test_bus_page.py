@@ -75,6 +75,39 @@ def test_the_worst_node_stands_first() -> None:
     ]
 
 
+def test_what_fills_a_busy_bus_stands_before_what_suffers_from_it() -> None:
+    """71 % of the frames stood seventh and in black below six nodes that missed 1.5 %."""
+    injected = TalkInfo("other", None, 5560.0, [0x7FF])
+    missing = replace(HIP, pdos_missing_percent=1.5)
+    busy = replace(
+        BUS, load_percent=90.0, frames_per_s=6260.0, talks=[injected, *TALKS], nodes=[missing, GAIT]
+    )
+    first, second, *_ = rows(busy, PARTS, told(), live=True)
+    assert (first.name, first.ids, first.colour) == ("no known node", "0x7FF", "warn")
+    assert first.mark is not None
+    assert first.mark.word == "most of the load"
+    assert (second.name, second.colour) == ("left hip", "warn")
+    full = by_name(rows(replace(busy, load_percent=99.0), PARTS, told(), live=True))["no known node"]
+    assert full.colour == "bad"
+    quiet = by_name(rows(replace(busy, load_percent=20.0), PARTS, told(), live=True))["no known node"]
+    assert quiet.mark is None
+
+
+def test_a_silent_cause_stands_before_what_comes_of_it() -> None:
+    unreliable = Alarm(Kind.FAULT, "gait", "it reports 0x8130", "gait")
+    names = [row.name for row in rows(BUS, PARTS, told(unreliable, LOST), live=True)]
+    assert names[:2] == ["left knee", "gait"]
+
+
+def test_of_many_identifiers_the_lowest_and_the_highest_are_told_and_never_only_some() -> None:
+    """Six drives' RPDOs were told as four."""
+    rpdos = [TalkInfo("RPDO", node, 100.0, [0x200 + node]) for node in range(1, 7)]
+    cut = TalkInfo("TPDO", 1, 400.0, [0x181, 0x281, 0x381, 0x481])
+    found = by_name(rows(replace(BUS, talks=[*rpdos, cut], frames_per_s=1000.0), PARTS, told(), live=True))
+    assert found["RPDO"].ids == "0x201 … 0x206"
+    assert found["left hip"].ids == "0x181, 0x281, 0x381, 0x481, …"
+
+
 def test_shown_frames_add_up_to_the_bus_with_silent_nodes_too() -> None:
     for talks in (TALKS, [*TALKS, TalkInfo("heartbeat", 2, 12.4)]):
         bus = replace(BUS, talks=talks)

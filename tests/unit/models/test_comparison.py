@@ -1,5 +1,6 @@
 """Models beside one another: what is better is said, and what is not known is never a number."""
 
+import dataclasses
 from datetime import UTC, datetime
 from typing import Any
 
@@ -94,7 +95,26 @@ def test_last_week_is_not_known_where_nobody_has_labelled_it() -> None:
     quality = Quality(200, 192, 6, 2, {})
     known = Entry(card(), "a", False, (), "", {"exo-01": quality})
     assert last_week(known) == "exo-01: 96.0 % right, 3.0 % wrong, 1.0 % not said of 200 labelled"
-    assert week_short(known) == "exo-01 96.0 %"
+    assert week_short(known) == "96.0 % of 200"
+
+
+def test_labels_of_one_class_alone_prove_nothing_of_the_others() -> None:
+    """A detector of falls was 100 % right in a week without a fall."""
+    steady = Quality(200, 200, 0, 0, {"steady": {"steady": 200}})
+    one = Entry(card(classes=("steady", "near_fall", "fall")), "a", False, (), "", {"exo-01": steady})
+    assert week_short(one) == "only steady labelled"
+    assert last_week(one).endswith("of 200 labelled; none of it labelled near fall, fall")
+    both = Quality(4, 4, 0, 0, {"steady": {"steady": 2}, "fall": {"fall": 2}})
+    two = dataclasses.replace(one, hits={"exo-01": steady, "exo-02": both})
+    assert week_short(two) == "exo-01 only steady labelled, exo-02 4 of 4"
+
+
+def test_the_worst_of_one_wearer_is_no_figure_of_its_own() -> None:
+    figures = {"macro_f1": 0.9, "covered": 0.99, "worst_subject_covered": 0.99}
+    alone = card(metrics=Metrics(figures=figures, per_subject={"s3": 0.9}))
+    assert "The same, for the worst wearer" not in {row.name for row in rows(alone, None)}
+    two = card(metrics=Metrics(figures=figures, per_subject={"s3": 0.9, "s4": 0.8}))
+    assert "The same, for the worst wearer" in {row.name for row in rows(two, None)}
 
 
 def test_judges_that_differ_or_are_known_already_are_pointed_out() -> None:

@@ -124,7 +124,7 @@ def test_a_bus_that_is_a_little_less_full_than_busy_says_until_when_it_is_called
 def test_what_fills_a_bus_is_named_by_its_identifiers() -> None:
     injected = TalkInfo("other", None, 9000.0, [0x7F0, 1 << 31 | 0x123, 1 << 30 | 0x182])
     found = fewer(replace(BUS, load_percent=97.0, talks=[*BUS.talks, injected]))
-    assert "no known node (0x7F0, 0x00000123, 0x182 (remote request)): find what sends them" in found
+    assert "no known node (0x7F0, 0x182 (remote request), 0x00000123): find what sends them" in found
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_a_better_model_serves_and_an_equal_one_does_not(
     assert "it serves now, for exo" in capsys.readouterr().out
     (pointer,) = registry.history("activity", "exo")
     assert pointer.model == model
-    assert "on wearers it has not seen (always guessing the same" in pointer.why
+    assert "it has not seen (always guessing the same" in pointer.why
     assert main.main([*arguments, "--json"]) == 1
     heard = capsys.readouterr()
     told = json.loads(heard.out)

@@ -95,7 +95,7 @@ def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool)
     )
     ours = f"{100 * figures['macro_f1']:.1f} %"
     assert decision.why == (
-        f"macro_f1 {ours} on wearers it has not seen (always guessing the same: 20.0 %)",
+        f"macro_f1 {ours} on ada and bob alone, whom it has not seen (always guessing the same: 20.0 %)",
         "not compared with another: no promoted model serves yet",
     )
 
