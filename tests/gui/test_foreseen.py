@@ -21,8 +21,8 @@ from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
-from server_gui.views.overview.page import Overview
 from server_gui.views.marks import Mark
+from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import (
     NOT_NAMED,
     PredictionRow,

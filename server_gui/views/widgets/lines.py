@@ -22,7 +22,7 @@ class Lines(QWidget):
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(6)
-        grid.setVerticalSpacing(1)
+        grid.setVerticalSpacing(0)  # between lines that are hidden Qt has none
         grid.setColumnStretch(1, 1)
         self._rows = [(MarkIcon(theme, 10), ShrinkingLabel()) for _ in range(most)]
         for row, (icon, label) in enumerate(self._rows):
@@ -36,7 +36,7 @@ class Lines(QWidget):
         grid = self._grid
         label = self._rows[0][1].sizeHint().height()
         for row in range(len(self._rows)):
-            grid.setRowMinimumHeight(row, label)
+            grid.setRowMinimumHeight(row, label + 1)
 
     @property
     def texts(self) -> list[str]:
