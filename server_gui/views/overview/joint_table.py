@@ -213,7 +213,7 @@ class BarDelegate(SentenceDelegate):
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         high = self._theme.px(BAR_HIGH)
         text = QStyleOptionViewItem(option)
-        if any(isinstance(index.siblingAtColumn(column).data(BAR), Bar) for column in (ANGLE, TORQUE)):
+        if any(isinstance(index.sibling(index.row(), one).data(BAR), Bar) for one in (ANGLE, TORQUE)):
             text.rect = option.rect.adjusted(0, 0, 0, -high - 1)  # all words of a row on one line
         super().paint(painter, text, index)
         bar = index.data(BAR)
