@@ -10,12 +10,12 @@ from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import HELD, IN_FAULT, NONE_ENABLED, STOPPING
-from server_gui.core.desk.confidence import Worth, belief, blind, not_judged
+from server_gui.core.desk.confidence import NOT_SEEN, Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
-from server_gui.core.prediction.newest_predictions import STALE_S, Recalled, StationPredictions, Told
+from server_gui.core.prediction.newest_predictions import NOT_YET, STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.tuning.stop import is_off
 from server_gui.views.marks import Mark, age_text, enabled_text, state_mark
@@ -46,10 +46,12 @@ UNDRIVEN: Final = {  # what of such a robot is said where there is little room, 
 }
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
-NOT_YET: Final = "its activity is not known yet"
+ACTIVITY_NOT_YET: Final = "its activity is not known yet"
 AS_KNOWN: Final = "as far as is known"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
+NOT_NAMED: Final = "Wearer not named"
+PREDICTED: Final = "predicted"
 UNSEEN: Final = "not judged"  # for the model does not see all
 
 
@@ -64,6 +66,7 @@ class PredictionRow:
     tip: str = ""
     brief: str = ""  # all of it where there is the least room
     is_doubtful: bool = False  # the model says itself that it is not to be relied on
+    is_unchecked: bool = False  # nobody has compared what the model says with what was so
 
     @property
     def short_text(self) -> str:
@@ -106,7 +109,15 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     shape = ("square", "bad") if falls else ("diamond", "accent")
     is_doubtful = worth.worth is Worth.DOUBTFUL  # then a percentage would look sure
     text = f"{word}?" if is_doubtful else f"{word} {100 * prediction.probability:.0f} %"
-    return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
+    row = PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
+    is_unchecked = worth.worth is Worth.UNCHECKED and prediction.task == ACTIVITY
+    return _modest(row, word) if is_unchecked and not isinstance(shown, Recalled) else row
+
+
+def _modest(row: PredictionRow, word: str) -> PredictionRow:
+    """Return it without its percentage, which would look like how often it is right."""
+    said = [f"{PREDICTED}, {one}" for one in (row.detail, row.short)]
+    return replace(row, text=word, detail=said[0], short=said[1], is_unchecked=True)
 
 
 def unjudged(why: str) -> PredictionRow:
@@ -150,8 +161,22 @@ def by_steps(station: Station) -> PredictionRow:
         mark, few = Mark("ring", "old", "not known"), "too few steps seen yet"
         return PredictionRow(mark, "Activity not known", few, "", why)
     if not walks:
-        return PredictionRow(Mark("ring", "dim", "no steps"), "No steps", SEEN, SEEN_SHORT, why)
-    return PredictionRow(Mark("diamond", "accent", WALK), label_text(WALK), SEEN, SEEN_SHORT, why)
+        return PredictionRow(Mark("ring", "dim", "no steps"), "No steps", _seen(station), SEEN_SHORT, why)
+    return PredictionRow(Mark("diamond", "accent", WALK), label_text(WALK), _seen(station), SEEN_SHORT, why)
+
+
+def _seen(station: Station) -> str:
+    """Return that the steps tell it, and what keeps the model from doing so if there is one."""
+    predictions, shown = station.predictions, station.predictions.told.get(ACTIVITY)
+    if predictions.problem == NOT_YET and not station.robot.is_recording:
+        return f"{SEEN_SHORT}; model not ready yet"
+    if shown is None or isinstance(shown, Recalled):
+        return SEEN
+    learned = {channel.partition(".")[0] for channel in shown.predicted.card.channels}
+    lost = [part.name for part in station.robot.not_ok() if part.state in NOT_SEEN and part.name in learned]
+    if not lost:
+        return f"{SEEN_SHORT}; the model predicts nothing now"
+    return f"{SEEN_SHORT}; the model needs the {' and the '.join(lost)}".replace("_", " ")
 
 
 def doing(station: Station) -> tuple[str, ...]:
@@ -240,7 +265,20 @@ def _unseen(station: Station) -> str:
     """Return why a good balance is not believed: what a model needs is not there, or too little was seen."""
     if missing := blind(station):
         return missing
-    return NOT_YET if station.is_live and activity(station).mark.word == "not known" else ""
+    return ACTIVITY_NOT_YET if station.is_live and activity(station).mark.word == "not known" else ""
+
+
+def most_needed(rows: list[PredictionRow]) -> list[PredictionRow]:
+    """Leave out that the wearer has no name where something is wrong that needs the line."""
+    is_wrong = any(row.mark.colour in ("bad", "warn") for row in rows)
+    return [row for row in rows if not (is_wrong and row.text == NOT_NAMED)]
+
+
+def instead_of_insoles(station: Station) -> list[str]:
+    """Return what a leg's steps are detected by where its insole is silent: `left by its joints`."""
+    silent = (part.name for part in station.robot.not_ok())
+    told = ((name.partition("_")[0], _steps_by(station, name)) for name in silent)
+    return [f"{leg} {by.removeprefix('steps ')}" for leg, by in told if by]
 
 
 def _steps_by(station: Station, part: str) -> str:
@@ -255,7 +293,7 @@ def _learning(adapting: Adapting) -> PredictionRow:
     """Return the progress of learning from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
-        AdaptationState.UNNAMED: ("Wearer not named", adapting.text),
+        AdaptationState.UNNAMED: (NOT_NAMED, adapting.text),
         AdaptationState.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
         AdaptationState.LEARNING: ("Learning", whom),
         AdaptationState.TRYING: (
@@ -368,7 +406,9 @@ def _as_predicted(line: PredictionRow) -> PredictionRow:
     """Return it as it is said where other things stand beside it; what is old is no prediction."""
     if line.mark.word == OLD:
         return line
-    return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
+    if line.detail.startswith(PREDICTED):
+        return line
+    return replace(line, detail=" · ".join(filter(None, (PREDICTED, line.detail))))
 
 
 def _runner_up(shown: Told) -> str:

@@ -59,12 +59,12 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
         replace(one, edit=replace(one.edit, changes=(ParameterChange("gait.step_length", 0.4, 0.43),)))
     )
     parts.edits.refresh()
-    assert "gait.step_length 400 → 430 mm: worse" in parts.edits.verdict.text()
+    assert "step length (gait) 400 → 430 mm: worse" in parts.edits.verdict.text()
     assert "0.05993 °" in parts.edits.words.toolTip()
     assert "(95 % interval +17.5 to +20.9 %); means 0.2867 → 0.3433 °" in parts.edits.words.text()
     bench.desk.shown.change(Units(by_si={"m": "m", "rad": "rad"}))
     parts.edits.refresh()
-    assert "gait.step_length 0.40 → 0.43 m: worse" in parts.edits.verdict.text()
+    assert "step length (gait) 0.40 → 0.43 m: worse" in parts.edits.verdict.text()
     assert "0.001046 rad" in parts.edits.words.toolTip()
 
 
@@ -261,3 +261,36 @@ def test_a_note_that_names_no_time_at_all_stays_as_it_was_written() -> None:
     wrong = "compared with 2026-13-41T25:00:00Z (ab12), which overlaps"
     assert _by_our_clock(wrong) == wrong
     assert "Z (ab12)" not in _by_our_clock("compared with 2026-11-03T14:20:00Z (ab12), which overlaps")
+
+
+def test_a_trial_with_too_few_strides_is_tried_again_by_way_of_the_review(
+    bench: Bench, window: MainWindow
+) -> None:
+    bench.look_again([looked()])
+    page = window.tabs.edits
+    one = worse(is_final=True)
+    edit = replace(
+        one.edit, changes=(ParameterChange("gait.step_length", 0.4, 0.43),), state=EditState.REVERTED
+    )
+    for word in (Word.WORSE, Word.FEW):
+        few = Curves("left_knee.position", Side((0.1,) * 101, (0.01,) * 101, 40), None)
+        found = replace(one, edit=edit, evidence=replace(one.evidence, word=word), curves=(few,))
+        bench.station.judged.take(found)
+        page.refresh()
+        assert page.try_again.isHidden() is (word is Word.WORSE)
+    page.try_again.click()
+    assert {name: one.value for name, one in bench.station.edits.staged.items()} == {"gait.step_length": 0.43}
+    assert [change.new for change in window.parameters.review.changes] == [0.43]
+    assert bench.first.named("write") == []
+    page.refresh()
+    assert page.try_again.isHidden(), "staged already"
+
+
+def test_strides_that_are_too_few_are_dashed_and_said_to_be(bench: Bench, parts: Parts) -> None:
+    one = worse()
+    for count in (8, 7):
+        after = Side((0.2,) * 101, (0.01,) * 101, count)
+        curves = tuple(Curves(each.channel, each.before, after) for each in one.curves)
+        bench.station.judged.take(replace(one, curves=curves))
+        parts.edits.refresh()
+        assert ("dashed where there are fewer than 8 strides" in parts.edits._legend.text()) is (count < 8)

@@ -195,7 +195,7 @@ def test_every_button_has_room_where_panels_stand_one_behind_the_other(
         panel.stage("gait.step_length", value)
         panel.refresh()
         panel.begin_review()
-        panel.review.write_it.setText("Overwrite 12")
+        panel.review.write_it.setText("Overwrite 12 now")
         QApplication.processEvents()  # layouts within another are laid out anew by events
         assert panel.minimumSizeHint().width() <= STACK
         panel.pages.setCurrentIndex(0)
@@ -203,7 +203,12 @@ def test_every_button_has_room_where_panels_stand_one_behind_the_other(
     panel.stage("gait.step_length", 0.43)
     panel.resize(STACK, 600)
     panel.refresh()
-    assert panel.detail._brief.is_whole
+    QApplication.processEvents()
+    for part in (panel.detail._facts, panel.detail.range):
+        assert part.visibleRegion().boundingRect() == part.rect(), "part of it is cut off"
+    facts = panel.detail._facts.text()
+    for said in ("default 420", "stored: unknown", "may be changed", "one write moves it by", "object 0x"):
+        assert said in facts
     assert panel.heightForWidth(STACK) <= HIGH
 
 

@@ -21,8 +21,20 @@ from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
+from server_gui.views.marks import Mark
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import activity, doing, lines, model_phases, status, step_phases
+from server_gui.views.predictions import (
+    NOT_NAMED,
+    PredictionRow,
+    activity,
+    doing,
+    instead_of_insoles,
+    lines,
+    model_phases,
+    most_needed,
+    status,
+    step_phases,
+)
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
@@ -87,20 +99,22 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     window: Parts, station: Station
 ) -> None:
     station.take_prediction(predicted("walk", WALKS))
-    said = f"{UNCHECKED} · else turn 4 %"
-    shown(window, lambda: chip(window) == f"Walk 94 %\npredicted · {said}")
+    said = f"predicted, {UNCHECKED} · else turn 4 %"
+    shown(window, lambda: chip(window) == f"Walk\n{said}")
+    assert window.header._chips["status"]._words.parts == ("not checked", "predicted")
     now = window.overview.now.activity
-    shown(window, lambda: now.main.text().startswith("Walk 94 %  "))
+    shown(window, lambda: now.main.text().startswith("Walk  "))
     assert now.detail.text() == said
     assert re.search(r"Activity of [^\n]+, activity-3fa2c1", now.toolTip())
     assert "activity-3fa2c1" not in now.main.text() + now.detail.text(), "nobody reads a model's hash"
-    assert window.overview._ring._word == "Walk 94 %"
+    assert window.overview._ring._word == "Walk", "94 % looks like how often it is right"
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {})
     station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
     line = activity(station)
+    assert line.text == "Walk 94 %"
     assert line.detail == "right 94 % last week (312 checked) · else turn 4 %"
     assert line.short == "right 94 % last week"
     assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled" in line.tip
@@ -143,7 +157,7 @@ def test_a_fall_stands_before_all_else(station: Station) -> None:
     station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
     line = status(station)
     assert line is not None
-    assert line.text == "Walk 94 %"
+    assert line.text == "Walk"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None
@@ -169,7 +183,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
     station.take_prediction(predicted("walk", {"walk": 1.0}))
     window.header.refresh()
     assert "doubtful" not in window.header._chips["status"]._words.parts
-    assert doing(station)[0].startswith("Walk 100 % 120 steps/min · ")
+    assert doing(station)[0].startswith("Walk 120 steps/min · ")
 
 
 @pytest.mark.parametrize(
@@ -221,7 +235,7 @@ def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: Parts, sta
     assert activity(station).wordings[0] == "Not judged · nothing comes from left knee"
     shown(window, lambda: chip(window).startswith("Not judged"))
     station.take_prediction(predicted("walk", WALKS))
-    assert activity(station).text == "Walk 94 %"
+    assert activity(station).text == "Walk"
 
 
 def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: Station) -> None:
@@ -235,6 +249,21 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: St
     assert isinstance(newest, NewestPrediction)
     assert window.overview._ring._word == "Walk"
     assert doing(station)[0].startswith("Walk 120 steps/min · ")
+
+
+def test_what_keeps_a_model_from_predicting_is_said_beside_the_steps(station: Station) -> None:
+    assert activity(station).detail == "from the steps seen; model not ready yet"
+    said = predicted("walk", WALKS)
+    card = msgspec.structs.replace(said.card, channels=("left_knee.position", "right_knee.position"))
+    station.take_prediction(dataclasses.replace(said, card=card))
+    newest = station.predictions.by_task["activity"]
+    old = dataclasses.replace(newest, came_ns=time.monotonic_ns() - 5 * 10**9)
+    station.predictions.by_task["activity"] = old
+    assert activity(station).detail == "from the steps seen; the model predicts nothing now"
+    station.take([looked(state="lost", problem="its heartbeat is missing")])
+    assert activity(station).detail == "from the steps seen; the model needs the left knee"
+    station.take_prediction(Serves("exo-01", {}, {"activity": "no model serves activity"}))
+    assert activity(station).detail == "from the steps seen, without a model"
 
 
 def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(window: Parts, station: Station) -> None:
@@ -346,3 +375,7 @@ def test_of_a_lost_insole_it_is_said_by_what_its_leg_s_steps_are_seen(
     (line,) = (row for row in lines(station) if row.text.startswith("left insole"))
     assert line.detail == "it went away · steps by its joints"
     assert "left insole: lost · steps by its joints" in line.wordings
+    assert instead_of_insoles(station) == ["left by its joints"]
+    unnamed = PredictionRow(Mark("ring", "dim", "unnamed"), NOT_NAMED)
+    assert most_needed([line, unnamed]) == [line], "what is worse needs the line"
+    assert most_needed([unnamed]) == [unnamed]

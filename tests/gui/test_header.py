@@ -1,6 +1,7 @@
 """The header at every width: nothing in it lies over anything else, whatever it has just been told."""
 
 import itertools
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -11,8 +12,9 @@ from server_gui.views.frame.header import Header
 from server_gui.views.frame.recording_chip import _words
 from server_gui.views.theme import Theme
 from tests.gui import rules
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Around, Bench, destroy
 from tests.gui.test_rules import _fault, _link_lost, _never_reached, _stopped, _unconfirmed, _walks
+from tests.support.desk import JOINTS, telemetry
 
 LEAST = 1024  # wide, where every number has room
 WIDTHS = (*range(320, 1000, 120), LEAST, 1366, 1920)
@@ -127,3 +129,13 @@ def test_it_is_always_said_which_robot_is_looked_at_and_how_it_is(
         assert header.stop.is_whole
         halved = rules.halved_numbers(header)
         assert halved == [], state.__name__
+
+
+def test_where_a_drive_is_not_known_the_chip_says_what_the_others_do(around: Around, bench: Bench) -> None:
+    now_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    states["left_knee.state"] = [None]
+    bench.station.take([telemetry([now_ns], states, now_ns)])
+    bench.draw(around)
+    words = around.header._chips["drives"]._words
+    assert (words.main, words.parts[0]) == ("1 of 6 drives not known", "5 off")

@@ -165,7 +165,7 @@ def test_a_limit_beyond_the_range_is_an_arrow_at_its_edge_and_is_said_to_be_ther
 ) -> None:
     torque = overview._plots[1]
     assert torque.plot._marks._shown.limits == ()
-    assert torque.plot._marks._shown.beyond == (0.0, 1.0), "above and below"
+    assert torque.plot._arrows._beyond == (0.0, 1.0), "above and below"
     assert [glyph for _, glyph, text in torque.legend._parts if "80" in text] == ["↕"]
     newest_ns = bench.station.rings.newest_ns or 0
     stamps_ns = [newest_ns + (row + 1) * 10_000_000 for row in range(50)]
@@ -173,7 +173,7 @@ def test_a_limit_beyond_the_range_is_an_arrow_at_its_edge_and_is_said_to_be_ther
     bench.station.take([telemetry(stamps_ns, columns, time.monotonic_ns() + round(HOUR_S * 1e9))])
     draw(overview)
     draw(overview)
-    assert list(torque.plot._marks._shown.beyond) == [1.0]
+    assert list(torque.plot._arrows._beyond) == [1.0]
     assert [glyph for _, glyph, text in torque.legend._parts if "80" in text] == ["┅"]
 
 

@@ -101,7 +101,7 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden_and_another_robot_s_with_i
     other.writing.trial = Trial(7, {"gait.step_length": 0.43}, {"gait.step_length": 0.4}, until_ns)
     bench.draw(window)
     assert window.trial.isVisible()
-    assert window.trial.words.text().startswith("exo-02: on trial: gait step length 400 → 430 mm")
+    assert window.trial.words.text().startswith("exo-02: on trial: step length (gait) 400 → 430 mm")
     window.trial.take_back.emit()
     assert bench.commands[1].named("revert") == [(7,)]
     assert not bench.first.named("revert")

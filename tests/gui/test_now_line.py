@@ -29,7 +29,7 @@ def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, benc
     overview.read_now()
     overview.refresh()
     assert overview.now.trial.isVisible()
-    assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
+    assert overview.now.trial.main.text() == "On trial: step length (gait) 400 → 420 mm"
     assert overview.now.trial.detail.text().startswith("taken back in ")
     asked: list[object] = []
     overview.now.compare.connect(asked.append)
@@ -51,7 +51,7 @@ def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, ot
     now.show()
     for scale in (1.0, 1.5):
         theme.set(scale=scale)
-        for width, is_offered in itertools.product(range(220, 1000, 60), (True, False)):
+        for width, is_offered in itertools.product(range(220, 1060, 60), (True, False)):
             now.offer(is_offered)
             now.resize(round(width * scale), 200)
             now.refresh()
@@ -61,7 +61,7 @@ def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, ot
             assert shown.is_whole, (width, scale, shown.shown)
             assert end.is_whole, (width, scale, end.shown)
             assert now.keep.isVisible() is is_offered
-    assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
+    assert now.trial.main.shown.startswith("On trial: step length (gait) 400 → 420 mm")
     destroy(now)
 
 

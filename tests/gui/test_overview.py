@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFontMetrics, QFontMetricsF, QImage
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gateway.client import ConnectionState
 from gateway.units import Units
@@ -26,8 +26,10 @@ from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.marks import Mark
 from server_gui.views.overview.joint_table import ANGLE, ERROR, STATE, STOP, TORQUE, JointModel, JointTable
 from server_gui.views.overview.page import Overview
+from server_gui.views.predictions import PredictionRow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, beside_legs, chain, placed_names
 from server_gui.views.widgets.gait_ring import GaitRing, Phases
@@ -488,3 +490,13 @@ def test_letters_in_the_ring_are_read_and_as_large_whatever_phase_it_is(theme: T
     assert sizes[0] == sizes[1]
     assert min(sizes[0]) >= theme.text_font(0.75).pointSizeF()
     destroy(ring)
+
+
+def test_the_ring_stays_as_large_as_lines_below_it_come_and_go(overview: Overview) -> None:
+    row = PredictionRow(Mark("ring", "dim", "steady"), "Balance: Steady")
+    seen = set()
+    for count in (0, 1, 3):
+        overview.status_lines.show_lines([row] * count)
+        QApplication.processEvents()
+        seen.add((overview._ring.height(), overview._plots[0].y()))
+    assert len(seen) == 1

@@ -1,8 +1,12 @@
 """Where the overview has no room for everything, its sections are on pages, each of them whole."""
 
+import dataclasses
+
+import msgspec
 import pytest
 from PySide6.QtWidgets import QScrollArea
 
+from gateway.wire.component import QualityInfo
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.page import Overview
 from server_gui.views.overview.sections import (
@@ -117,3 +121,21 @@ def test_the_chosen_page_stays_as_alarms_come_and_go_and_shows_what_is_so_now(
     assert page._page == WEARER | PLOTS
     assert page._plots[0].isVisible()
     assert not page._joints.isVisible()
+
+
+def test_an_insole_in_trouble_is_named_on_the_button_of_the_wearer(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    now = looked()
+    lost: QualityInfo = {"state": "lost", "age_ms": 4000.0, "problem": "the port is gone"}
+    quality = {**now.quality.quality, "left_insole": lost}
+    wrong = dataclasses.replace(now, quality=msgspec.structs.replace(now.quality, quality=quality))
+    bench.station.take([walking(300), wrong])
+    page = window.tabs.overview
+    settle(window, bench)
+    assert page.sections.buttons[0].text() == "Joints"
+    button = page.sections.buttons[1]
+    assert button.text() == "■ Wearer and plots: left insole"
+    assert button.property("tone") == "bad"

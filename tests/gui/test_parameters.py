@@ -21,7 +21,7 @@ from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from tests.gui.fakes import Bench
 from tests.gui.running import wait
-from tests.support.desk import HELD, JOINTS, described, looked, walking
+from tests.support.desk import HELD, JOINTS, described, looked, telemetry, walking
 
 
 def row(panel: ParametersPanel, name: str) -> list[str]:
@@ -87,7 +87,7 @@ def test_a_value_that_changed_elsewhere_is_flagged_before_it_is_overwritten(
     assert bench.first.named("write") == []
     panel.refresh()
     assert row(panel, "gait.step_length")[SAID] == "⚠ changed"
-    assert panel.review.write_it.text() == "Overwrite 1"
+    assert panel.review.write_it.text() == "Overwrite 1 now"
     assert not panel.review.write_it.isEnabled(), "a click meant for what stood there before counts"
     settle(panel)
     panel.review.write_it.click()
@@ -190,6 +190,34 @@ def test_a_refusal_stands_on_its_row_and_the_edit_stays(panel: ParametersPanel, 
     assert bench.station.writing.rows == {"gait.step_length": "it holds 429"}
     assert row(panel, "gait.step_length")[NEW] == "430"
     assert "not written: rolled back" in panel.banner.text()
+
+
+@pytest.mark.parametrize(("state", "leads"), [(4.0, "Try it for"), (None, "Try it for"), (1.0, "Write 1")])
+def test_a_trial_is_what_is_meant_unless_every_drive_is_known_to_be_off(
+    panel: ParametersPanel, bench: Bench, state: float | None, leads: str
+) -> None:
+    now_ns = time.monotonic_ns()
+    states = {f"{joint}.state": [state] for joint in JOINTS}
+    bench.station.take([telemetry([now_ns], states, now_ns)])
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    review = panel.review
+    assert [one.text() for one in (review.try_it, review.write_it) if one.objectName() == "primary"] == [
+        leads
+    ]
+
+
+def test_a_review_says_how_long_a_verdict_takes_only_while_somebody_walks(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    panel.refresh()
+    assert panel.review.takes.isHidden()
+    bench.station.take([walking(1200)])  # a stride a second
+    wait(lambda: bool(bench.station.processing.derived().gait.cadence_spm), "had a cadence")
+    panel.refresh()
+    assert panel.review.takes.text() == "a verdict takes about 9 s: 8 cycles of each leg"
 
 
 def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, bench: Bench) -> None:

@@ -156,7 +156,7 @@ def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: The
     assert below.text().endswith(" · 5 more")
     assert rules.cut_words(below, [below]) == []
     below.say([], frozenset({TORQUE}))
-    assert below.text() == "Bars: how much torque of its limit"
+    assert below.text() == "Bars: torque as share of its limit"
     below.say([], frozenset())
     assert below.text() == ""
     destroy(below)

@@ -466,7 +466,8 @@ class Station:
         if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
             return
         if self.robot.holds(trial.before):
-            self._taken_back("the trial's time is over: the robot has taken it back. see Edits")
+            again = self.writing.held_again(trial.before)
+            self._taken_back(f"the trial's time is over, the robot has taken it back: {again}; see Edits")
         else:
             self.writing.trial = None
             self.writing.say(

@@ -1,11 +1,11 @@
 """Edits and their metrics in words: the same in the command and in the window. Values are SI."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
 from gateway.amounts import NONE, counted
-from server_gui.core.evidence.comparison import Evidence, Measured, Word
+from server_gui.core.evidence.comparison import FEWEST, Evidence, Measured, Word
 from server_gui.core.evidence.edits import Edit, EditState
 from server_gui.core.evidence.file import EditEvidence
 
@@ -15,9 +15,12 @@ MOST_SHARE: Final = 10.0  # times what was before, which else was next to nothin
 NO_UNITS: Final[Mapping[str, str]] = MappingProxyType({})
 
 
-def changes(edit: Edit, units: Mapping[str, str] = NO_UNITS) -> str:
-    """Return each parameter, what from and to; `units` are those that the values are in, by parameter."""
-    said = (f"{one.name} {from_to(one.old, one.new)} {units.get(one.name, '')}" for one in edit.changes)
+def changes(edit: Edit, units: Mapping[str, str] = NO_UNITS, name: Callable[[str], str] = str) -> str:
+    """Return each parameter, by its `name`, what from and to.
+
+    `units` are those that the values are in, by parameter.
+    """
+    said = (f"{name(one.name)} {from_to(one.old, one.new)} {units.get(one.name, '')}" for one in edit.changes)
     return ", ".join(one.rstrip() for one in said)
 
 
@@ -68,8 +71,17 @@ def word(told: EditEvidence) -> str:
 
 
 def strides(evidence: Evidence) -> str:
-    """Return the numbers of compared strides; those since the revert have the old values, too."""
+    """Return the numbers of compared strides; those since the revert have the old values, too.
+
+    Where they are not enough, those that are too few come first, and how many it takes.
+    """
     before, after, back = evidence.cycles_before, evidence.cycles_after, evidence.cycles_back
+    if evidence.word is Word.FEW and min(before, after) < 2 * FEWEST:
+        old = f"{before - back} before and {back} since it was taken back" if back else f"{before} before"
+        with_it = f"{after} with it"
+        few, others = (with_it, old) if after <= before else (old, with_it)
+        few = few.replace(" ", " gait cycles " if few.partition(" ")[0] != "1" else " gait cycle ", 1)
+        return f"{few}, and it takes {FEWEST} of each leg; {others}"
     if not back:
         return f"{counted(before, 'gait cycle')} before, {after} after"
     return (

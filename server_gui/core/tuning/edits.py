@@ -108,6 +108,12 @@ def unit_of(name: str, si: str, units: Units) -> Unit:
     return units.unit(name.partition(".")[2], si)
 
 
+def spoken(name: str) -> str:
+    """Return a parameter's name for people, where it stands alone: `step length (gait)`."""
+    component, _, quantity = name.replace("_", " ").partition(".")
+    return f"{quantity} ({component})" if quantity else component
+
+
 def brief(unit: Unit, value: float) -> str:
     """Return four digits, and a decimal place more than its unit is read with, where they are not zeros.
 

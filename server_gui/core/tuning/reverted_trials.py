@@ -10,7 +10,6 @@ from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 OVERDUE_S: Final = 2.0  # after its end values are looked at again
-BACK: Final = "taken back: the values from before are held again"
 OTHERS: Final = "taken back, but other values are held: look at them"
 
 
@@ -40,8 +39,9 @@ class RevertedTrials:
         before, at_ns = self._awaited
         if self._robot.holds(before):
             self._awaited = None
-            self._writing.reverted(BACK)
-            self._tell(NewsKind.PARAMETER, BACK)
+            back = f"taken back: {self._writing.held_again(before)}"
+            self._writing.reverted(back)
+            self._tell(NewsKind.PARAMETER, back)
         elif read_ns - at_ns > OVERDUE_S * 1e9:
             self._awaited = None
             self._writing.say(WriteState.UNKNOWN, OTHERS)

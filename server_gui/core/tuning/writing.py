@@ -8,11 +8,13 @@ from enum import Enum
 from typing import Final
 
 from gateway.client import NotConnected, RemoteError
+from gateway.units import Unit
 from gateway.wire.method import Number
 from gateway.wire.parameter import Written
 from server_gui.core.follow import frame_time
-from server_gui.core.tuning.edits import ReviewedEdit
+from server_gui.core.tuning.edits import ReviewedEdit, spoken
 
+TOLD: Final = 2  # values that are said one by one
 UNDO: Final = 100  # writes that can be taken back one after another
 UNSURE: Final = (
     "device_timeout",
@@ -60,12 +62,26 @@ class WriteProgress:
         default_factory=lambda: collections.deque(maxlen=UNDO)
     )
     revision: int = 0
+    units: dict[str, Unit] = field(default_factory=dict)  # in which each was reviewed
 
     def began(self, changes: tuple[ReviewedEdit, ...]) -> None:
         """Note that these were sent."""
         self._set(WriteState.WRITING, f"writing {_count(len(changes))} …")
         for change in changes:
             self.rows.pop(change.name, None)
+            self.units[change.name] = change.unit
+
+    def held_again(self, before: Mapping[str, Number]) -> str:
+        """Return in words what was read back after a trial: `step length (gait) is 400 mm again`."""
+        said = [
+            f"{spoken(name)} is {unit.editable(before[name])} {unit.symbol}".rstrip()
+            for name, unit in self.units.items()
+            if name in before
+        ]
+        if len(said) < len(before):
+            return "the values from before are held again"
+        more = f" and {len(said) - TOLD} more are" if len(said) > TOLD else ""
+        return f"{', '.join(said[:TOLD])}{more} again"
 
     def done(self, written: Written) -> None:
         """Take the values that the robot has written and read back."""
@@ -129,4 +145,4 @@ def written_line(change: ReviewedEdit, written: Written) -> str:
     unit = change.unit
     old = "?" if before is None else unit.editable(before)
     new = "?" if after is None else unit.editable(after)
-    return f"{change.name} {old} → {new} {unit.symbol}".rstrip()
+    return f"{spoken(change.name)} {old} → {new} {unit.symbol}".rstrip()

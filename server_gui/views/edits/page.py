@@ -4,7 +4,7 @@ import datetime
 import re
 from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -22,7 +22,7 @@ from gateway.amounts import counted
 from gateway.units import with_minus
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.comparison import FEWEST, Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.display_units import in_units, symbols
 from server_gui.core.evidence.edits import EditState
@@ -30,6 +30,7 @@ from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
 from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import record, what, whole
+from server_gui.core.tuning.edits import spoken
 from server_gui.views.experiments.form import ExperimentForm, Tried
 from server_gui.views.experiments.response_plot import ResponsePlot
 from server_gui.views.theme import Theme
@@ -50,7 +51,13 @@ NONE: Final = (
     "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
     "torque and gait is judged here, stride by stride, before and after."
 )
-COLOURS: Final = "grey before, in colour after; {}the bands are one standard deviation of the strides"
+COLOURS: Final = (
+    "grey before, in colour after, over a stride from 0 to 100 %; {}the bands are one standard deviation "
+    "of the strides"
+)
+DASHED: Final = f"dashed where there are fewer than {FEWEST} strides; "
+AGAIN: Final = "Try it again…"
+AGAIN_TIP: Final = "Stage the same value again, and open its review: nothing is sent before"
 EDIT: Final = re.compile(
     r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
 )  # when, and its id for the command
@@ -58,7 +65,12 @@ BACK: Final = "strides since it was taken back are grey, too: they have the old 
 
 
 class Edits(QWidget):
-    """Every edit of the robot that is looked at, newest first, and what the chosen one did."""
+    """Every edit of the robot that is looked at, newest first, and what the chosen one did.
+
+    `again` brings the values (SI, by parameter) that had too few strides, to be reviewed and tried again.
+    """
+
+    again = Signal(object)
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
@@ -104,6 +116,7 @@ class Edits(QWidget):
         station = self._desk.selected
         self.ab.setEnabled(station is not None)
         self.sweep.setEnabled(station is not None)
+        self.try_again.setVisible(bool(self._to_try_again))
         run = None if station is None else station.experiment
         writes = () if run is None else run.writes
         judged = [] if station is None else whole(tuple(station.judged), writes)
@@ -148,14 +161,19 @@ class Edits(QWidget):
     def _left(self) -> QVBoxLayout:
         """Return the list, and what else may be tried."""
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
+        self.try_again = QPushButton(AGAIN)
+        self.try_again.setToolTip(AGAIN_TIP)
+        self.try_again.clicked.connect(lambda: self.again.emit(self._to_try_again))
+        self.try_again.hide()
         self.ab.setToolTip("Compare two values of a parameter, several times in random order")
         self.sweep.setToolTip("Increase a parameter in small steps, while you watch")
         self.ab.clicked.connect(lambda: self._ask(ExperimentKind.AB, self._desk.selected))
         self.sweep.clicked.connect(lambda: self._ask(ExperimentKind.SWEEP, self._desk.selected))
         buttons, column = QHBoxLayout(), QVBoxLayout()
+        column.addWidget(self.list, 1)
+        column.addWidget(self.try_again)
         buttons.addWidget(self.ab)
         buttons.addWidget(self.sweep)
-        column.addWidget(self.list, 1)
         column.addLayout(buttons)
         column.addStretch(0)  # while there is no list, they stand at the top
         return column
@@ -174,6 +192,20 @@ class Edits(QWidget):
             tried = tried or self._chosen_edit(station)
             self.form = ExperimentForm(self, self._desk, station, self._theme, kind, tried)
             self.form.show()
+
+    @property
+    def _to_try_again(self) -> dict[str, float]:
+        """Values of the shown edit that had too few strides and is over; none while others are staged."""
+        told, station = self._chosen, self._desk.selected
+        if told is None or station is None or told.experiment is not None:
+            return {}
+        is_over = told.edit.state is EditState.REVERTED and told.evidence.word is Word.FEW
+        if not is_over or station.writing.trial or station.edits.staged:
+            return {}
+        known = next((one for one in station.judged if one.edit.id == told.edit.id), None)  # SI
+        changes_si = () if known is None else known.edit.changes
+        found = {one.name: one.new for one in changes_si}
+        return found if found.keys() <= station.known.keys() else {}
 
     def _chosen_edit(self, station: Station) -> Tried | None:
         """Return the shown edit, unless something was staged or tried since."""
@@ -213,6 +245,7 @@ class Edits(QWidget):
 
     def _choose(self) -> None:
         told = self._drawn = self._chosen
+        self.try_again.setVisible(bool(self._to_try_again))
         self._legend.setVisible(bool(told and told.curves))
         self.list.setVisible(bool(self._shown))  # an empty frame says nothing
         self.verdict.setVisible(told is not None)
@@ -222,7 +255,9 @@ class Edits(QWidget):
             set_text(self.verdict, self._verdict(told))
             set_tone(self.verdict, TONES.get(told.evidence.word, ""))
             set_text(self.words, with_minus("\n".join(_said(told))))
-            set_text(self._legend, COLOURS.format(BACK if told.evidence.cycles_back else ""))
+            sides = (side for one in told.curves for side in (one.before, one.after) if side is not None)
+            dashed = DASHED if any(side.cycles < FEWEST for side in sides) else ""
+            set_text(self._legend, COLOURS.format(dashed + (BACK if told.evidence.cycles_back else "")))
         set_tip(self.words, "" if told is None else with_minus("\n".join(map(_in_unit, _strong(told)))))
         tried = None if told is None else told.experiment
         self.response.setVisible(tried is not None and self.response.show_response(tried))
@@ -263,7 +298,7 @@ class Edits(QWidget):
     def _what(self, told: EditEvidence) -> str:
         """Return the changed parameters, in their units."""
         if told.experiment is None:
-            return changes(told.edit, self._units.get(told.edit.id, {}))
+            return changes(told.edit, self._units.get(told.edit.id, {}), spoken)
         return f"{what(told)} {told.experiment.unit}".rstrip()
 
     def _line(self, told: EditEvidence) -> str:

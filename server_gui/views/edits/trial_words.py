@@ -7,8 +7,9 @@ from gateway.amounts import counted
 from gateway.units import Units
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
+from server_gui.core.evidence.edits import SETTLE_NS
 from server_gui.core.evidence.wording import share
-from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.edits import spoken, unit_of
 from server_gui.core.tuning.writing import Trial
 
 TO_AB: Final = "Take it back now, and ask about an A/B trial of both values"
@@ -17,7 +18,7 @@ UNLIKE: Final = "too few strides before and after are comparable"
 
 
 def changes(station: Station, trial: Trial, units: Units) -> list[str]:
-    """Return each value with the one from before: `gait step length 400 → 430 mm`."""
+    """Return each value with the one from before: `step length (gait) 400 → 430 mm`."""
     return [f"{name} {values}" for name, values in _changes(station, trial, units)]
 
 
@@ -76,6 +77,16 @@ def _not_enough(evidence: Evidence) -> str:
     return f"too early to judge it: {strides}; it takes {FEWEST} of each leg, before and since"
 
 
+def verdict_takes(station: Station) -> tuple[str, ...]:
+    """Return how long a trial takes to be judged at this cadence; nothing where nobody walks."""
+    gait = station.processing.derived().gait
+    if not station.is_live or not gait.walking or not gait.cadence_spm:
+        return ()
+    seconds = SETTLE_NS / 1e9 + FEWEST * 2 * 60.0 / gait.cadence_spm
+    said = f"a verdict takes about {seconds:.0f} s"
+    return f"{said}: {FEWEST} cycles of each leg", said
+
+
 def ends(trial: Trial) -> str:
     """Return when it goes back."""
     left_s = trial.left_s()
@@ -91,5 +102,5 @@ def _changes(station: Station, trial: Trial, units: Units) -> list[tuple[str, st
         before = trial.before.get(name)
         old = "?" if before is None else unit.editable(before)
         values = f"{old} → {unit.editable(value)} {unit.symbol}".rstrip()
-        found.append((name.replace("_", " ").replace(".", " "), values))
+        found.append((spoken(name), values))
     return found

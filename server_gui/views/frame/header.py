@@ -13,7 +13,7 @@ from server_gui.core.alarms.texts import TEXTS
 from server_gui.core.alarms.unconfirmed import remedy, unconfirmed
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.stop import ENABLED, StopState, is_off
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import SHORTER, Mark, age_text, drives_mark, enabled_text
@@ -239,7 +239,16 @@ def _drives(station: Station) -> Words:
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
     few = SHORTER.get(mark.word, mark.word).capitalize()
     brief = (few, count.removesuffix(" enabled"))
-    return Words(mark, mark.word.capitalize(), (count, "CiA 402"), brief=brief)
+    parts = (*_others(station), count, "CiA 402")
+    return Words(mark, mark.word.capitalize(), parts, brief=brief)
+
+
+def _others(station: Station) -> tuple[str, ...]:
+    """Return what the other drives do where some are not known: `5 off`."""
+    words = [station.robot.word(f"{joint}.state") for joint in station.robot.names("joint")]
+    counts = {"enabled": words.count(ENABLED), "off": sum(map(is_off, words))}
+    said = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    return (said,) if None in words and said else ()
 
 
 def _status(station: Station) -> Words:
@@ -249,6 +258,7 @@ def _status(station: Station) -> Words:
     if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         parts = ("doubtful", "predicted") if line.is_doubtful else parts
+        parts = ("not checked", "predicted") if line.is_unchecked else parts
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, problem, seen = (
         station.processing.derived().gait,

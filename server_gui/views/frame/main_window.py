@@ -146,6 +146,7 @@ class MainWindow(QMainWindow):
         nobody.setWidget(self.empty)
         self.tabs = Pages(desk, theme, archive, commissioning)
         self.tabs.edited.connect(self._edit_parameter)
+        self.tabs.tried_again.connect(self._try_again)
         self.empty.recordings.connect(self.tabs.look_at_recordings)
         for bar in (self.trial, self.parameters.trial):
             bar.compare.connect(lambda station: self.tabs.edits.compare(station))
@@ -323,6 +324,13 @@ class MainWindow(QMainWindow):
     def _edit_parameter(self, name: str) -> None:
         self._panels.bring(self.docks[1])
         self.parameters.edit_parameter(name)
+
+    def _try_again(self, values: dict[str, float]) -> None:
+        """Stage these (SI), and show what would be written."""
+        self._panels.bring(self.docks[1])
+        for name, value in values.items():
+            self.parameters.stage(name, value)
+        self.parameters.begin_review()
 
     def _end_trial(self, *, keep: bool) -> None:
         station = self._desk.selected

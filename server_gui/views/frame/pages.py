@@ -39,11 +39,13 @@ class View(Protocol):
 class Pages(QTabWidget):
     """Each is made when it is first looked at or asked for: all take longer than the rest of the window.
 
+    `tried_again` brings the values (SI) of a trial that was too short to be judged.
     `edited` brings the name of a parameter that somebody wants to change, `connect_to` the file of a robot
     that a gateway is to be started for.
     """
 
     edited = Signal(str)
+    tried_again = Signal(object)
     connect_to = Signal(str)
 
     def __init__(
@@ -68,7 +70,7 @@ class Pages(QTabWidget):
         self._buses = self._add("&Bus", lambda: BusHealthView(desk, theme))
         self._objects = self._add("Ob&jects", self._make_objects)
         self._audit = self._add("&Audit", lambda: Audit(desk, theme, journals))
-        self._edits = self._add("&Edits", lambda: Edits(desk, theme))
+        self._edits = self._add("&Edits", self._make_edits)
         if archive is not None:
             kept = archive
             self._recordings = self._add(
@@ -177,6 +179,11 @@ class Pages(QTabWidget):
         made.is_paced = False
         made.opened.connect(self.open_channels)
         made.now.compare.connect(lambda station: self.edits.compare(station))
+        return made
+
+    def _make_edits(self) -> Edits:
+        made = Edits(self._desk, self._theme)
+        made.again.connect(self.tried_again)
         return made
 
     def _make_objects(self) -> ObjectsPage:

@@ -78,6 +78,7 @@ FEW_WORDS: Final = {
     "fault reaction active": "fault",
 }
 LEAST_ERROR: Final = "0x0000"  # its words stand below the table then
+BAR_HIGH: Final = 4  # at text of 100 %
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -209,22 +210,25 @@ class BarDelegate(SentenceDelegate):
             option.text = text.partition(" ")[0] if text.startswith("0x") else self.pointer
         elif self.is_tight and index.column() == STATE:
             option.text = in_few_words(text)
-        if isinstance(index.data(BAR), Bar):  # which lies below it
-            option.displayAlignment = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        super().paint(painter, option, index)
+        high = self._theme.px(BAR_HIGH)
+        text = QStyleOptionViewItem(option)
+        if any(isinstance(index.sibling(index.row(), one).data(BAR), Bar) for one in (ANGLE, TORQUE)):
+            text.rect = option.rect.adjusted(0, 0, 0, -high - 1)  # all words of a row on one line
+        super().paint(painter, text, index)
         bar = index.data(BAR)
         if not isinstance(bar, Bar):
             return
-        box = QRectF(option.rect.adjusted(6, 0, -6, 0))
-        field = QRectF(box.left(), box.bottom() - 2, box.width(), 2)
+        box = QRectF(option.rect.adjusted(6, 0, -6, -1))
+        bar_box = QRectF(box.left(), box.bottom() - high, box.width(), high)
+        field = bar_box.adjusted(0, high / 4, 0, -high / 4)
         painter.fillRect(field, self._theme.colour("border"))
         share = min(max(bar.share, -1.0), 1.0)
         middle, reach = field.center().x(), field.width() / 2 * abs(share)
         left = middle if share >= 0 else middle - reach
-        painter.fillRect(QRectF(left, field.top() - 1, reach, 4), self._theme.colour(bar.colour))
-        painter.fillRect(QRectF(middle - 0.5, field.top() - 1, 1, 4), self._theme.colour("dim"))
+        painter.fillRect(QRectF(left, bar_box.top(), reach, high), self._theme.colour(bar.colour))
+        painter.fillRect(QRectF(middle - 0.5, bar_box.top(), 1, high), self._theme.colour("dim"))
 
 
 class JointTable(QTableView):

@@ -17,12 +17,12 @@ WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 # By the columns with bars that are shown; the fullest wording first.
 BARS: Final = {
     frozenset({ANGLE, TORQUE}): (
-        "Bars: how far from its target, 10° at the end, and how much torque of its limit",
-        "Bars: away from its target, and torque of its limit",
-        "Bars: off its target; torque of its limit",
+        "Bars: error to target (full: 10°); torque as share of its limit",
+        "Bars: error to target; torque as share of its limit",
+        "Bars: error to target; share of limit",
     ),
-    frozenset({ANGLE}): ("Bars: how far from its target, 10° at the end", "Bars: off its target"),
-    frozenset({TORQUE}): ("Bars: how much torque of its limit", "Bars: torque of its limit"),
+    frozenset({ANGLE}): ("Bars: error to target (full: 10°)", "Bars: error to target"),
+    frozenset({TORQUE}): ("Bars: torque as share of its limit", "Bars: share of limit"),
     frozenset(): ("",),
 }
 

@@ -123,9 +123,15 @@ class KeyPlot(Card):
             return [*curves, *lines, *([(bad, "↕", f"{of_beyond[wording]}{beyond}")] if beyond else [])]
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
-        wordings: tuple[tuple[int, Mapping[str, str]], ...] = (0, {}), (1, {}), (2, {}), (2, LETTERS)
+        wordings: tuple[tuple[int, Mapping[str, str]], ...] = (
+            (0, {}),
+            (1, {}),
+            (1, LETTERS),
+            (2, {}),
+            (2, LETTERS),
+        )
         fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
-        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if at_start else 2])))
+        self.legend.say(parts(told.values(), *next(fits, wordings[-1 if at_start else 3])))
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
         )

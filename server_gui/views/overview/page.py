@@ -4,7 +4,7 @@ Where not all of it is seen at once, the joints come before the pictures: their 
 Where it has less room still, its sections are on pages: fewer things, and whole.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
@@ -12,6 +12,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
+from server_gui.core.alarms.severity import colour_of
 from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import Load, Sole, loads, sole
@@ -34,7 +35,15 @@ from server_gui.views.overview.sections import (
     arranged,
 )
 from server_gui.views.overview.sections import PLOTS as PLOTS_ALONE
-from server_gui.views.predictions import STOPPED, activity, lines, model_phases, step_phases
+from server_gui.views.predictions import (
+    STOPPED,
+    activity,
+    instead_of_insoles,
+    lines,
+    model_phases,
+    most_needed,
+    step_phases,
+)
 from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
@@ -296,7 +305,8 @@ class Overview(QWidget):
         if slow:
             self._model.refresh()
             self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
-            self.sections.say([joint for joint, _ in self._model.errors], self._table.tone)
+            joints = [joint for joint, _ in self._model.errors]
+            self.sections.say({Section.JOINTS: (joints, self._table.tone), Section.WEARER: _unwell(station)})
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots
@@ -355,8 +365,9 @@ class Overview(QWidget):
         if slow:
             sources = {one.value.replace("_", " ") for one in derived.sources.values() if one is not None}
             model = any(modelled.values())
-            self._status.set_note(*(_meaning(sources, model=model) if live else old_text(station)))
-            self.status_lines.show_lines(list(lines(station)))
+            meaning = _meaning(sources, instead_of_insoles(station), model=model)
+            self._status.set_note(*(meaning if live else old_text(station)))
+            self.status_lines.show_lines(most_needed(list(lines(station))))
             self.learned.refresh(station)
 
     def _words(self, station: Station) -> tuple[str, str]:
@@ -427,6 +438,15 @@ class Overview(QWidget):
         self._pressure.set_note(*((sources, count, "") if live else old_text(station)))
 
 
+def _unwell(station: Station) -> tuple[list[str], str]:
+    """Return what of the wearer's sensors is not well, and how bad that is."""
+    joints = station.robot.names("joint")
+    names = [part.name for part in station.robot.not_ok() if part.name not in joints]
+    shown = [name for name in names if name.endswith("_insole") or name == "trunk"]
+    colours = {colour_of(name, station.alarms) for name in shown}
+    return [name.replace("_", " ") for name in shown], "bad" if "bad" in colours else "warn"
+
+
 def legs_of(station: Station) -> tuple[str, ...]:
     """Return the sides of which the robot has a joint; both where that is not known."""
     joints = station.robot.names("joint")
@@ -450,11 +470,13 @@ def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
     return f"{side.upper()}  {said}", f"{side[0].upper()}  {said}"
 
 
-def _meaning(sources: Collection[str], *, model: bool) -> tuple[str, ...]:
-    """Return what the rings mean, the fullest wording first."""
+def _meaning(sources: Collection[str], instead: Sequence[str], *, model: bool) -> tuple[str, ...]:
+    """Return what the rings mean, the fullest wording first; what stands `instead` of an insole stays."""
     rings, short = "outer ring left, inner right", "outer left, inner right"
     told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
     told += ["dot: model"] if model else []
+    if instead:
+        return " · ".join([rings, *told]), f"{short} · {', '.join(instead)}", ", ".join(instead), instead[0]
     return tuple(dict.fromkeys((" · ".join([rings, *told]), rings, short, "outer L, inner R")))
 
 

@@ -20,6 +20,8 @@ class Section(Enum):
     PLOTS = "plots"
 
 
+Wrong = tuple[Collection[str], str]  # what is not well, and its tone
+TONES: Final = ("", "warn", "bad")  # the worst last
 Page = frozenset[Section]
 JOINTS, WEARER, PLOTS = (frozenset({section}) for section in Section)
 ALL: Final[tuple[Page, ...]] = (JOINTS | WEARER | PLOTS,)
@@ -84,18 +86,21 @@ class SectionBar(QFrame):
             button.setVisible(place < len(pages))
             button.setChecked(place < len(pages) and pages[place] == shown)
         self.setVisible(len(pages) > 1)
-        self.say((), "")
+        self.say({})
 
-    def say(self, wrong: Collection[str], tone: str) -> None:
-        """Say on the button of joints which ones are not well: they may be on the page behind it."""
+    def say(self, wrong: Mapping[Section, Wrong]) -> None:
+        """Say on the buttons what of joints and wearer is not well: it may be on the page behind one."""
         if len(self._pages) < 2:
             return
-        is_behind = Section.JOINTS not in frozenset.intersection(*self._pages)
+        everywhere = frozenset.intersection(*self._pages)
         for button, page in zip(self.buttons, self._pages, strict=False):
-            text, is_bad = name_of(page, self._pages), False
-            if wrong and is_behind and Section.JOINTS in page:
-                which, is_bad = next(iter(wrong)) if len(wrong) == 1 else f"{len(wrong)} not ok", True
+            behind = [wrong[one] for one in Section if one in page - everywhere and one in wrong]
+            names = [name for found, _ in behind for name in found]
+            tone = max((tone for _, tone in behind), key=TONES.index, default="")
+            text = name_of(page, self._pages)
+            if names:
+                which = names[0] if len(names) == 1 else f"{len(names)} not ok"
                 text = f"{GLYPHS['square' if tone == 'bad' else 'triangle']} {text}: {which}"
             if button.text() != text:
                 button.setText(text)
-            set_tone(button, tone if is_bad else "")
+            set_tone(button, tone if names else "")

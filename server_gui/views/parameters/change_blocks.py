@@ -6,7 +6,7 @@ from typing import Final
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QScrollArea
 
-from server_gui.core.tuning.edits import ReviewedEdit
+from server_gui.core.tuning.edits import ReviewedEdit, spoken
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -24,14 +24,14 @@ def mark_of(change: ReviewedEdit) -> str:
 
 
 def lines_of(change: ReviewedEdit) -> tuple[str, str, str]:
-    """Return its name, old and new value, and how far that goes within what limits."""
+    """Return its name, old and new value, how far that goes within what limits, and its id."""
     old = "–" if change.old is None else change.unit.editable(change.old)
     step = f"change {change.by}" if change.by else ""
     allowed = f"allowed {range_text(*change.allowed, change.unit)} {change.unit.symbol}".strip()
     return (
-        change.name,
+        spoken(change.name),
         f"{old} → {change.unit.editable(change.new)} {change.unit.symbol}".strip(),
-        " · ".join(filter(None, (step, allowed))),
+        " · ".join(filter(None, (step, allowed, change.name))),
     )
 
 
@@ -68,7 +68,7 @@ class ChangeBlocks(QScrollArea):
     def _block(self, change: ReviewedEdit) -> str:
         name, values, limits = map(rich, lines_of(change))
         for sign in "._":
-            name = name.replace(sign, f"{sign}{BREAK}")
+            limits = limits.replace(sign, f"{sign}{BREAK}")
         bad, dim = (self._theme.colour(one).name() for one in ("bad", "dim"))
         mark = rich(mark_of(change))
         marked = f' &nbsp;<span style="color:{bad}">{mark}</span>' if mark else ""

@@ -19,9 +19,9 @@ from server_gui.views.parameters.several_joints_menu import SeveralMenu
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 STEPS: Final = 200
+BAR_SHARE: Final = 9  # of the title's line, where the limits' bar stands in it
 SEVERAL: Final = "The same for other joints: one change, reviewed, written and reverted as a whole"
 
 
@@ -77,25 +77,24 @@ class Detail(Card):
         set_tip(self._several, SEVERAL)
         self._several.setMenu(self.several)
         self.range = RangeBar(theme)
-        below = QHBoxLayout()
-        below.addWidget(self.range, 1)
-        below.addWidget(self._several)
-        self.body.addLayout(below)
+        self._below = QHBoxLayout()
+        self._below.addWidget(self.range, 1)
+        self._below.addWidget(self._several)
+        self.body.addLayout(self._below)
         self._facts = PlainLabel("Choose a parameter above; F2 or typing edits it.")
         self._facts.setObjectName("dim")
         self._facts.setWordWrap(True)
         set_tip(self._facts, f"Stored: {RULE}")
         self.body.addWidget(self._facts)
-        self._brief = ShrinkingLabel("dim")
-        self._brief.hide()
-        self.body.addWidget(self._brief)
 
     def be_short(self, is_short: bool) -> None:
-        """Take little room: seen when one is chosen; one line says the most of what is known, its tip all."""
+        """Take little room: seen when one is chosen, with the limits' bar in the line of its name."""
         self._is_short = is_short
-        for part in (self._facts, self.range, self._several):
-            part.setVisible(not is_short)
-        self._brief.setVisible(is_short)
+        self._several.setVisible(not is_short)
+        if is_short:
+            self.head.insertWidget(1, self.range, BAR_SHARE)
+        else:
+            self._below.insertWidget(0, self.range, 1)
         self.refresh()
 
     def choose(self, name: str | None) -> None:
@@ -130,14 +129,8 @@ class Detail(Card):
         self.range.show_range(info, unit, current, None if staged is None else staged.value, self._range)
         self._several.setEnabled(info.component in station.robot.names("joint"))
         facts = _facts(station, info, unit, current)
-        known, _, problem = facts.partition("\n")
-        parts = known.split(" · ")
-        self._brief.say(*(" · ".join(parts[:count]) for count in range(len(parts), 0, -1)))
-        set_text(self._facts, problem if self._is_short else facts)
-        self._facts.setVisible(bool(problem) or not self._is_short)
-        self._brief.setVisible(self._is_short and not problem)
-        if self._brief.toolTip() != facts:
-            set_tip(self._brief, facts)
+        known, _, problem = facts.partition("\n")  # the more important first where it may be scrolled
+        set_text(self._facts, "\n".join(filter(None, (problem, known))) if self._is_short else facts)
 
     def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:
         self._range = reach(info, current)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -26,6 +26,7 @@ from server_gui.core.tuning.comparison import open_file, save_file, staged_as
 from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.several_joints import Offer
 from server_gui.core.tuning.writing import WriteProgress, WriteState
+from server_gui.views.edits.trial_words import verdict_takes
 from server_gui.views.marks import time_of_day
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
@@ -41,9 +42,11 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
+NOT_KNOWN: Final = "Whether drives are enabled is not known now."
 ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
 NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
 NO_LINK: Final = "There is no link to the robot: nothing can be stored"
+REVIEW_WIDE: Final = 95  # its button with a number of two digits, at text of 100 %
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
 
@@ -53,7 +56,9 @@ class ParametersPanel(QWidget):
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
+        self._theme = theme
         self._problem = ""
+        self._is_short = self._is_in_two = False
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk, theme), Review(theme)
@@ -119,11 +124,28 @@ class ParametersPanel(QWidget):
         for button in self._seldom:
             button.setVisible(not is_short)
         self.detail.be_short(is_short)
+        self._is_short = is_short
+        self._below.setMinimumWidth(1 if is_short else 0)  # narrower, they are in two rows
+        self._place_buttons()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_buttons()
+
+    def _place_buttons(self) -> None:
+        """Put all in one row where they have room: else they take that of the tree and the card."""
+        grid, margins = self._buttons_grid, self.contentsMargins()
+        needed = sum(one.sizeHint().width() for one in (self.undo, self._discard, self.more))
+        wide = needed + 3 * grid.horizontalSpacing() + self._theme.px(REVIEW_WIDE) + 16
+        in_two = self._is_short and self.width() - margins.left() - margins.right() < wide
+        if in_two is self._is_in_two:
+            return
+        self._is_in_two = in_two
         for button in (self.review_button, self.more):
-            self._buttons_grid.removeWidget(button)
-        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[is_short]
+            grid.removeWidget(button)
+        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[in_two]
         for button, (row, column) in zip((self.review_button, self.more), place, strict=True):
-            self._buttons_grid.addWidget(button, row, column)
+            grid.addWidget(button, row, column)
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
@@ -357,6 +379,7 @@ class ParametersPanel(QWidget):
         now = station.difference(self._desk.shown.units)
         if (now, _acts(station)) != (self.review.changes, self.review.acts):
             self.review.show_changes(now, _acts(station), self._desk.whose)
+        self.review.say_how_long(*verdict_takes(station))
         if not now:
             self.pages.setCurrentIndex(EDIT)
 
@@ -392,8 +415,12 @@ def _dated(writing: WriteProgress) -> tuple[str, str]:
 def _acts(station: Station) -> str:
     """Return what is written to acts on, where somebody may stand in it."""
     if not station.is_live:
-        return "Whether drives are enabled is not known now."
-    return ACTS if any_enabled(station.robot) else ""
+        return NOT_KNOWN
+    if any_enabled(station.robot):
+        return ACTS
+    robot = station.robot
+    are_known = all(robot.word(f"{joint}.state") is not None for joint in robot.names("joint"))
+    return "" if are_known else NOT_KNOWN
 
 
 def _close_file(station: Station) -> None:

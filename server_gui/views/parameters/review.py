@@ -23,6 +23,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "Change", "Allowed", "")
 NAME, OLD, ARROW, NEW, UNIT, BY, ALLOWED, MARK = range(len(TITLES))
@@ -98,6 +99,9 @@ class Review(QWidget):
         row.addWidget(self.try_it)
         row.addWidget(self.seconds)
         row.addWidget(self.write_it)
+        self.takes = ShrinkingLabel("dim")
+        self.takes.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.takes.hide()
         everything = QVBoxLayout(self)
         everything.setContentsMargins(0, 0, 0, 0)
         everything.addWidget(self.title)
@@ -105,6 +109,7 @@ class Review(QWidget):
         everything.addWidget(self.blocks, 1)
         everything.addWidget(self.said)
         everything.addWidget(self.leave_out)
+        everything.addWidget(self.takes)
         everything.addLayout(row)
 
     def show_changes(self, changes: tuple[ReviewedEdit, ...], acts: str = "", whose: str = "") -> None:
@@ -131,7 +136,14 @@ class Review(QWidget):
         self._enable(False)
         self._allowed = bool(changes) and not problems
         self._settled.start(SETTLE_MS)
-        self.write_it.setText(f"Overwrite {len(elsewhere)}" if elsewhere else f"Write {len(changes)}")
+        count = len(elsewhere) or len(changes)
+        self.write_it.setText(f"{'Overwrite' if elsewhere else 'Write'} {count}{' now' if acts else ''}")
+        self._lead(self.try_it if acts else self.write_it)
+
+    def say_how_long(self, *takes: str) -> None:
+        """Say how long a trial must be for a verdict, the fullest wording first; nothing where none knows."""
+        self.takes.setVisible(bool(takes))
+        self.takes.say(*(takes or ("",)))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -156,6 +168,15 @@ class Review(QWidget):
             self.blocks.setHidden(not is_narrow)
             if had_keyboard:
                 self.take_keyboard()
+
+    def _lead(self, leading: QPushButton) -> None:
+        """Make this button the one that is meant: where somebody may stand in it, the trial."""
+        for button in (self.try_it, self.write_it):
+            name = "primary" if button is leading else ""
+            if button.objectName() != name:
+                button.setObjectName(name)
+                button.style().unpolish(button)
+                button.style().polish(button)
 
     def _enable(self, on: bool) -> None:
         self.try_it.setEnabled(on)

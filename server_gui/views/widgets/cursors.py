@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from server_gui.core.desk.flags import FlagKind
@@ -53,14 +53,13 @@ class CursorLayout:
     hover: float | None = None
     flags: tuple[tuple[float, FlagKind], ...] = ()
     limits: tuple[float, ...] = ()
-    beyond: tuple[float, ...] = ()  # limits that are out of sight: 0 above, 1 below
     box: QRectF | None = None  # in pixels
     words: str = ""  # instead of curves
 
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing to draw."""
-        several = self.at or self.flags or self.limits or self.beyond or self.words
+        several = self.at or self.flags or self.limits or self.words
         return not several and self.box is None and self.hover is None
 
 
@@ -71,6 +70,36 @@ def told(flags: Iterable[tuple[float, FlagKind]], apart: float) -> list[tuple[fl
         if all(abs(share - other) >= apart for other, _ in found):
             found.append((share, kind))
     return found
+
+
+class LimitArrows(QWidget):
+    """Beside the field, off its curves: an arrow at the edge behind which a limit is."""
+
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._beyond: tuple[float, ...] = ()
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.hide()
+
+    def show_limits(self, beyond: tuple[float, ...]) -> None:
+        """Show these from now on: 0 above, 1 below."""
+        if beyond != self._beyond:
+            self._beyond = beyond
+            self.setVisible(bool(beyond))
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("bad"))
+        wide = float(self.width())
+        for share in self._beyond:
+            tip = share * self.height()
+            foot = tip + wide if share < 0.5 else tip - wide
+            painter.drawPolygon(QPolygonF([QPointF(wide / 2, tip), QPointF(wide, foot), QPointF(0.0, foot)]))
+        painter.end()
 
 
 class Cursors(QWidget):
@@ -127,14 +156,6 @@ class Cursors(QWidget):
         for share in self._shown.limits:
             y = round(share * (self.height() - 1))
             painter.drawLine(0, y, self.width(), y)
-        side = self._theme.px(5)  # at the left: the newest values are at the right
-        painter.setPen(QPen(self._theme.colour("bad"), 1))
-        for share in self._shown.beyond:  # an arrow at the edge behind which it is
-            tip = round(share * (self.height() - 1))
-            foot = tip + side if share < 0.5 else tip - side
-            painter.drawLine(2, tip, 2 + 4 * side, tip)
-            for x in (2 + side, 2 + 3 * side):
-                painter.drawLine(2 + 2 * side, tip, x, foot)
 
     def _draw_flags(self, painter: QPainter) -> None:
         side = float(self._theme.px(9))

@@ -19,15 +19,24 @@ class Lines(QWidget):
         super().__init__()
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        grid = QGridLayout(self)
+        self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(6)
-        grid.setVerticalSpacing(1)
+        grid.setVerticalSpacing(0)  # between lines that are hidden Qt has none
         grid.setColumnStretch(1, 1)
         self._rows = [(MarkIcon(theme, 10), ShrinkingLabel()) for _ in range(most)]
         for row, (icon, label) in enumerate(self._rows):
             grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
             grid.addWidget(label, row, 1)
+        theme.changed.connect(self._reserve)
+        self._reserve()
+
+    def _reserve(self) -> None:
+        """Keep the room of all lines: what stands above and below is not moved as they come and go."""
+        grid = self._grid
+        label = self._rows[0][1].sizeHint().height()
+        for row in range(len(self._rows)):
+            grid.setRowMinimumHeight(row, label + 1)
 
     @property
     def texts(self) -> list[str]:

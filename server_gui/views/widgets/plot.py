@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QGraphicsItem, QWidget
 from server_gui.core.desk.flags import FlagKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
-from server_gui.views.widgets.cursors import CursorLayout, Cursors
+from server_gui.views.widgets.cursors import CursorLayout, Cursors, LimitArrows
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
 from server_gui.views.widgets.value_axis import ValueAxis
@@ -136,6 +136,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         item.getViewBox().sigResized.connect(self._place)
         self._lines = Curves(self.viewport())
         self._marks = Cursors(theme, self.viewport())
+        self._arrows = LimitArrows(theme, self.viewport())
         self._cache_axes()
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.viewport().setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -280,6 +281,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._lines.setGeometry(self.mapFromScene(field).boundingRect())
         self._marks.setGeometry(self._lines.geometry())
         self._marks.raise_()
+        beside = self._marks.geometry()
+        room = min(self.viewport().width() - beside.right() - 2, self._theme.px(9))
+        self._arrows.setGeometry(beside.right() + 2, beside.top(), max(room, 0), beside.height())
         self._cache_axes()
 
     def _cache_axes(self) -> None:
@@ -377,11 +381,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             hover=None if self._hover is None else share(self._hover),
             flags=tuple((share(flag.at), flag.kind) for flag in self._flags if self._is_in_sight(flag)),
             limits=tuple((high - at) / (high - low) for at in self._limits if low <= at <= high),
-            beyond=tuple({0.0 if at > high else 1.0: at for at in self._limits if not low <= at <= high}),
             box=field,
             words=NO_DATA if self._is_blank else "",
         )
         self._marks.show_marks(shown)
+        out_of_sight = (0.0 if at > high else 1.0 for at in self._limits if not low <= at <= high)
+        self._arrows.show_limits(tuple(dict.fromkeys(out_of_sight)))
 
     def _restyle(self) -> None:
         theme = self._theme

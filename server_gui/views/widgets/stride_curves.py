@@ -9,6 +9,7 @@ from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from gateway.units import Unit
+from server_gui.core.evidence.comparison import FEWEST
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot_frame import GAP, draw_frame
@@ -16,11 +17,11 @@ from server_gui.views.widgets.plot_frame import GAP, draw_frame
 Floats = npt.NDArray[np.float64]
 
 BAND: Final = 60  # of 255: how dense one is
-CYCLE: Final = ("0 %", ("of the gait cycle", "gait cycle"), "100 %")
+CYCLE: Final[tuple[str, tuple[str, ...], str]] = ("0", (), "100")  # %, as is said once above all of them
 
 
 class StrideCurves(QWidget):
-    """One channel over the stride: grey before, in the accent's colour after.
+    """One channel over the stride: grey before, in the accent's colour after; dashed of few strides.
 
     `hovered` tells where the pointer is, as a share of the stride (0–1), None: nowhere; `show_hover` reads
     the curves there.
@@ -127,7 +128,8 @@ class StrideCurves(QWidget):
         painter.setBrush(band)
         painter.drawPolygon(QPolygonF([*line(mean + deviation), *reversed(line(mean - deviation))]))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setPen(QPen(colour, 1.5))
+        few = Qt.PenStyle.DashLine if side.cycles < FEWEST else Qt.PenStyle.SolidLine
+        painter.setPen(QPen(colour, 1.5, few))
         painter.drawPolyline(QPolygonF(line(mean)))
 
     def _range(self, curves: Curves) -> tuple[float, float]:

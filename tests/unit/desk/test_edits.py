@@ -25,6 +25,9 @@ def changes(bench: Bench) -> tuple[ReviewedEdit, ...]:
 
 def on_trial(bench: Bench, seconds: float = 20.0) -> int:
     """A trial of another step length; when it is over, on our clock."""
+    stage(bench.station, STEP, 0.43)
+    bench.station.writing.began(changes(bench))
+    bench.station.edits.drop(STEP)
     bench.station.writing.done(Written(7, {STEP: 0.4}, {STEP: 0.43}, trial_s=seconds))
     assert bench.station.writing.trial is not None
     return bench.station.writing.trial.until_ns
@@ -135,7 +138,7 @@ def test_undo_stages_the_inverse_and_writes_nothing(bench: Bench) -> None:
     ("read_after_s", "holds", "said"),
     [
         (1.0, 0.4, "on trial"),  # too early to tell
-        (60.0, 0.4, "the robot has taken it back"),
+        (60.0, 0.4, "the robot has taken it back: step length (gait) is 400 mm again; see Edits"),
         (60.0, 0.43, "other values are held"),
     ],
 )
@@ -172,7 +175,7 @@ def test_a_trial_is_kept_or_taken_back_by_its_number(bench: Bench) -> None:
     ("holds", "after_s", "said"),
     [
         (0.43, 0.1, "taken back: reading what is held …"),  # asked for before the answer
-        (0.4, 0.1, "taken back: the values from before are held again"),
+        (0.4, 0.1, "taken back: step length (gait) is 400 mm again"),
         (0.43, 5.0, "taken back, but other values are held: look at them"),
     ],
 )

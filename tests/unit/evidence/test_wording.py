@@ -2,8 +2,8 @@
 
 import pytest
 
-from server_gui.core.evidence.comparison import Measured, Word
-from server_gui.core.evidence.wording import interval, share
+from server_gui.core.evidence.comparison import FEWEST, Evidence, Measured, Word
+from server_gui.core.evidence.wording import interval, share, strides
 
 
 @pytest.mark.parametrize(
@@ -23,3 +23,24 @@ def test_percent_is_of_what_was_before(
     low, high = difference - half, difference + half
     one = Measured("a.b", "b", unit, Word.SAME, 9, 9, before, before + difference, difference, low, high)
     assert (share(one), interval(one)) == said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "back", "said"),
+    [
+        (
+            13,
+            3,
+            4,
+            "3 gait cycles with it, and it takes 8 of each leg; 9 before and 4 since it was taken back",
+        ),
+        (40, 1, 0, "1 gait cycle with it, and it takes 8 of each leg; 40 before"),
+        (5, 40, 0, "5 gait cycles before, and it takes 8 of each leg; 40 with it"),
+    ],
+)
+def test_of_cycles_that_are_not_enough_those_come_first_that_decide(
+    before: int, after: int, back: int, said: str
+) -> None:
+    found = Evidence(Word.FEW, "", (), before, after, cycles_back=back)
+    assert FEWEST == 8
+    assert strides(found) == said
