@@ -5,8 +5,6 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
-    QAction,
-    QActionGroup,
     QCloseEvent,
     QKeySequence,
     QResizeEvent,
@@ -55,6 +53,7 @@ from server_gui.views.robots.panel import HINT_ALL, RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Look, Theme
+from server_gui.views.widgets.choice_menu import choices
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.visibility import has_focus_in, is_seen
@@ -432,17 +431,15 @@ class MainWindow(QMainWindow):
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}
         now = self._theme.look.value.capitalize()
-        _choices(menu.addMenu("Colours"), list(looks), now, lambda text: self._theme.set(look=looks[text]))
+        choices(menu.addMenu("Colours"), list(looks), now, lambda text: self._theme.set(look=looks[text]))
         sizes = {f"{percent} %": percent / 100 for percent in SCALES}
         size = f"{round(self._theme.scale * 100)} %"
-        _choices(
-            menu.addMenu("Text size"), list(sizes), size, lambda text: self._theme.set(scale=sizes[text])
-        )
+        choices(menu.addMenu("Text size"), list(sizes), size, lambda text: self._theme.set(scale=sizes[text]))
         units = menu.addMenu("Units")
         for si in CHOICES:
             symbols = [unit.symbol for unit in UNITS[si]]
             chosen = self._desk.shown.units.unit("", si).symbol
-            _choices(units.addMenu(f"{si} as"), symbols, chosen, self._unit_setter(si))
+            choices(units.addMenu(f"{si} as"), symbols, chosen, self._unit_setter(si))
         return menu
 
     def _unit_setter(self, si: str) -> Callable[[str], None]:
@@ -492,13 +489,3 @@ def _column(widget: QWidget) -> QVBoxLayout:
     column.setContentsMargins(0, 0, 0, 0)
     column.setSpacing(0)
     return column
-
-
-def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:
-    group = QActionGroup(menu)
-    for text in texts:
-        action: QAction = menu.addAction(text)
-        action.setCheckable(True)
-        action.setChecked(text == chosen)
-        group.addAction(action)
-    group.triggered.connect(lambda action: choose(action.text()))
