@@ -272,6 +272,15 @@ def test_marks_and_uploads_are_asked_for_and_told() -> None:
 # --- the whole window
 
 
+def test_the_status_bar_says_why_recording_is_yellow_however_little_room_it_has(
+    window: MainWindow, bench: Bench
+) -> None:
+    bench.desk.recording, _ = looked(FakeKeeper(report()))
+    bench.desk.recording.reach.looked(AWAY)
+    bench.draw(window)
+    assert all("store not reached" in wording for wording in window._bar.recording._wordings)
+
+
 def test_ctrl_r_asks_before_it_ends_a_recording_whose_chip_says_for_how_long_and_as_what(
     window: MainWindow, bench: Bench
 ) -> None:

@@ -57,7 +57,7 @@ NO_EVENTS_HINT: Final = (
 )
 NOT_REPLAYED: Final = (
     "· trouble of its buses was not recorded",
-    "· without its buses",
+    "· buses not recorded",
 )  # where there is room
 NOT_REPLAYED_HINT: Final = (
     "What is replayed are the robot's signals: it was recorded by another version, without its buses' trouble"
