@@ -36,7 +36,7 @@ from server_gui.core.tuning.link import CommandLink
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.file_gateway import FileGateway
 from server_gui.processes.interactive_command import talk
-from server_gui.processes.sim_control import SimControl
+from server_gui.processes.sim_control import SimControl, start_command
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.frame.application import application, kept_settings, kept_theme
@@ -336,6 +336,7 @@ class App:
         self.desk.select(station)
         if self._own.folder is not None:
             control = SimControl(self._own.folder)
+            station.robot.start_by = f"Start walking, or {start_command(self._own.folder)}"
             deliver = self._poster.deliver
             self.demo = DemoBar(self.window, self._own, control, station, self.theme, deliver)
 

@@ -15,12 +15,17 @@ from gateway.commission.nodes import OBSERVER, file_of
 
 CONTROLLER = "device.controller"
 NONE = "none"
+DRIVES_ONLY = "A STOP will reach the drives only, and what commands them goes on: gwrms check warns of it."
 _OBJECT = re.compile(r"0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})")
 
 
 def controller(draft: Draft, library: Library, told: Mapping[int, NodeAnswers]) -> Talk[None]:
     """Ask for the controller's node and stopping object; without one, a stop reaches only the drives."""
-    if draft.value("gateway", "role") != OBSERVER or draft.has(CONTROLLER, "value"):
+    if draft.value("gateway", "role") != OBSERVER:
+        return
+    if draft.has(CONTROLLER, "value"):
+        if draft.value(CONTROLLER, "value") is None:  # who goes on with it may be somebody else
+            yield Say(DRIVES_ONLY)
         return
     others = {node: one for node, one in told.items() if not one.axes}
     known = draft.value(CONTROLLER, "node_id")
@@ -40,9 +45,7 @@ def _which(draft: Draft, others: Mapping[int, NodeAnswers]) -> Talk[int | None]:
         None if others else NONE,  # Enter alone must not leave a controller out of every STOP
     )
     if choice == NONE:
-        yield Say(
-            "A STOP will reach the drives only, and what commands them goes on: gwrms check warns of it."
-        )
+        yield Say(DRIVES_ONLY)
         draft.put(CONTROLLER, "value", None, "nobody named one")
         return None
     draft.put(CONTROLLER, "node_id", int(choice), "named as who commands the drives")

@@ -1,6 +1,7 @@
 """Control of our simulator (faults and start) by its socket, as `gwrms sim-fault` does."""
 
 import os
+import shlex
 import socket
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,6 +39,11 @@ class Listed(msgspec.Struct, frozen=True):
 
     faults: dict[str, FaultKind]
     active: tuple[ActiveFault, ...]
+
+
+def start_command(folder: Path) -> str:
+    """Return the command by which a terminal starts the controller of the simulator in a folder."""
+    return f"gwrms sim-fault --dir {shlex.quote(str(folder))} --controller start"
 
 
 class SimControl:

@@ -19,6 +19,7 @@ from gateway.client import Address
 from server_gui.core.desk.first_steps import FirstStep, FirstSteps
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
+from server_gui.processes.sim_control import start_command
 from server_gui.processes.simulated import RobotPart
 from server_gui.terminal.output import print_line
 
@@ -69,7 +70,7 @@ def run(options: Options) -> int:
     view = "the window" if options.window else "a view"
     print_line(f"gwrms demo: a simulated exoskeleton, its gateway and {view} start; Ctrl-C ends all of them")
     with ShutdownSignals() as ending, _folder(options.folder) as folder:
-        print_line(f"gwrms demo: to walk on after a reset: gwrms sim-fault --dir {folder} --controller start")
+        print_line(f"gwrms demo: to walk on after a reset: {start_command(folder)}")
         try:
             with DemoRobot(options.scenario, folder) as own:
                 if options.window:
@@ -134,6 +135,7 @@ def _in_terminal(own: DemoRobot, options: Options, check: Callable[[], None]) ->
         own.check()
 
     with FollowedRobot(address) as session:
+        session.station.robot.start_by = "" if own.folder is None else start_command(own.folder)
         _view(session, options, str(address), check_all)
 
 

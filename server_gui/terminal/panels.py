@@ -339,7 +339,11 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     if writing.state in NOT_WRITTEN:
         return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
     active, newest = station.alarms.active, next(iter(station.news.items), None)
-    if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
+    if (
+        newest is not None
+        and newest.kind in (NewsKind.STOP, NewsKind.RESET)
+        and time.time() - newest.utc_s < SAID_S
+    ):
         return words(newest.text, style=WARN)
     if active and active[0].alarm.mark.colour in ("bad", "warn"):
         return _alarm(active, controls)

@@ -61,6 +61,9 @@ def draw(painter: QPainter, mark: Mark, colour: QColor, box: QRectF) -> None:
             painter.drawEllipse(inner)
         case "square":
             painter.drawRect(inner)
+        case "box":
+            painter.setBrush(QBrush())
+            painter.drawRect(inner)
         case "ring":
             painter.setBrush(QBrush())
             painter.drawEllipse(inner)

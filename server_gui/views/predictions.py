@@ -17,7 +17,8 @@ from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.newest_predictions import NOT_YET, STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import EventSource, Leg
-from server_gui.views.marks import Mark, enabled_text
+from server_gui.core.tuning.stop import is_off
+from server_gui.views.marks import Mark, age_text, enabled_text, state_mark
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
@@ -32,6 +33,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationSta
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
+BOTH: Final = "steps and model"  # that an agreement or a difference is between
 STEPS_BY: Final = {
     EventSource.KINEMATICS: "steps by its joints",
     EventSource.FOOT_IMU: "steps by its foot's IMU",
@@ -44,6 +46,8 @@ UNDRIVEN: Final = {  # what of such a robot is said where there is little room, 
 }
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged"
+ACTIVITY_NOT_YET: Final = "its activity is not known yet"
+AS_KNOWN: Final = "as far as is known"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 NOT_NAMED: Final = "Wearer not named"
@@ -178,16 +182,50 @@ def _seen(station: Station) -> str:
 def doing(station: Station) -> tuple[str, ...]:
     """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
+    if not station.is_live and is_last_held(station):
+        return last_held(station)
     if not station.is_live:
         return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
+    if line.mark.word == STOPPED and station.stopping.held:  # as the line above says
+        return tuple(dict.fromkeys((count, count.replace(" of ", "/"))))
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
     short = line.short_text
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
-    least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
+    bare = PROBABLE.sub("", short)
+    least = f"{bare} · {count.replace(' of ', '/')}"
     fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
-    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count, fewest)))
+    return tuple(
+        dict.fromkeys(
+            (f"{cadence} · {count}", f"{short} · {count}", f"{bare} · {count}", least, count, fewest)
+        )
+    )
+
+
+def is_last_held(station: Station) -> bool:
+    """Return whether a stop was held, and every drive off, by what has come last: nothing may have since."""
+    robot = station.robot
+    words = [robot.word(f"{joint}.state") for joint in robot.names("joint")]
+    is_held = station.stopping.held and not station.stopping.is_unproven
+    return (
+        is_held and bool(words) and all(is_off(word) and state_mark(word).colour == "dim" for word in words)
+    )
+
+
+def last_held(station: Station) -> tuple[str, ...]:
+    """Return that it was stopped, and for how long nothing has come; a reset may have ended it meanwhile."""
+    gone = no_data(station)
+    if station.is_linked:
+        words = f"STOPPED · {gone}", f"STOPPED · {gone.replace('data for', 'data')}", "STOPPED · no data"
+        return *words, "STOPPED"
+    return f"STOPPED, {AS_KNOWN} · {gone}", f"STOPPED, {AS_KNOWN}", "STOPPED when last seen", "STOPPED then"
+
+
+def no_data(station: Station) -> str:
+    """Return for how long nothing has come."""
+    age_s = station.robot.age_s()
+    return "no data" if age_s is None else f"no data for {f'{age_s:.1f} s' if age_s < 1 else age_text(age_s)}"
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:
@@ -197,11 +235,13 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         shown = None if stopped and task == GAIT_PHASE else predictions.told.get(task)
         if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
             line = said(shown, stopped=stopped, unseen=blind(station))
+            if task == FALLING and line.mark.colour == "accent" and (why := _unseen(station)):
+                line = PredictionRow(Mark("ring", "old", UNSEEN), UNSEEN, why, why, line.tip)
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
             if not station.is_live and line.mark.colour != "bad":
                 line = PredictionRow(Mark("ring", "old", "not known"), "not known", "no live data")
-            yield replace(line, text=f"{title}: {line.text}", brief=line.brief and f"{title}: {line.brief}")
+            yield replace(line, text=f"{title}: {line.text}", brief=_brief(title, line.brief))
     if predictions.problem:
         yield PredictionRow(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
@@ -219,6 +259,13 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         yield PredictionRow(mark, f"{name}: {mark.word}", " · ".join(filter(None, (why, by))), by, why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
         yield _learning(adapting)
+
+
+def _unseen(station: Station) -> str:
+    """Return why a good balance is not believed: what a model needs is not there, or too little was seen."""
+    if missing := blind(station):
+        return missing
+    return ACTIVITY_NOT_YET if station.is_live and activity(station).mark.word == "not known" else ""
 
 
 def most_needed(rows: list[PredictionRow]) -> list[PredictionRow]:
@@ -340,7 +387,13 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
         return replace(line, text="steps and model agree", brief="model agrees")
     mark = Mark("triangle", "warn", "differs")
     apart_by = f"{max(differences):.0f} % apart"
-    return replace(line, mark=mark, text=f"steps and model {apart_by}", brief=apart_by)
+    said = f"{BOTH} {apart_by}"
+    return replace(line, mark=mark, text=said, brief=said)
+
+
+def _brief(title: str, brief: str) -> str:
+    """Return a brief wording under its title; what says itself between which it is needs none."""
+    return brief and (brief if brief.startswith(BOTH) else f"{title}: {brief}")
 
 
 def _knows(shown: Told) -> bool:

@@ -12,6 +12,7 @@ SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 LOOSE: Final = 11  # px beside the name of a page, where there is room for that
 TIGHT: Final = 5  # else
 BASE_POINTS: Final = 9.0
+URGENT: Final = 0.16  # of the alarm's colour in the tint of what endangers somebody now
 
 
 class Look(Enum):
@@ -135,6 +136,7 @@ QLabel#dim[tone="bad"] {{ color: {bad}; }}
 QLabel#dim[tone="warn"] {{ color: {warn}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
+QWidget#playback {{ border: 1px solid {warn}; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}
 QLabel#banner[tone="plain"] {{ background: {card}; border-color: {border}; }}
 QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
@@ -254,6 +256,18 @@ class Theme(QObject):
     def px(self, pixels: float) -> int:
         """Return a length that grows with the text."""
         return round(pixels * self.scale)
+
+    @property
+    def urgent(self) -> QColor:
+        """The card's colour with a tint of alarm."""
+        card, bad = self.colour("card"), self.colour("bad")
+
+        def mixed(own: int, alarm: int) -> int:
+            return round(own + URGENT * (alarm - own))
+
+        return QColor(
+            mixed(card.red(), bad.red()), mixed(card.green(), bad.green()), mixed(card.blue(), bad.blue())
+        )
 
     def side(self, component: str) -> QColor:
         """Left is blue, right is orange, what has no side is plain."""

@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QApplication,
     QComboBox,
     QLineEdit,
     QWidget,
@@ -23,6 +24,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.tuning.stop import StopState
+from server_gui.views.frame.dock_title import DockTitle
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
@@ -88,8 +90,30 @@ def test_the_list_says_that_the_store_is_away_before_its_first_frame(
     shown.open("Cloud")
     archive.library.reach.looked("it cannot be reached")
     shown.window.tabs.setCurrentIndex(0)
-    assert page.said.text() == "The store is not reached, tried again by itself: it cannot be reached"
+    assert page.said.text() == "The store is not reached, retried automatically: it cannot be reached"
     assert page._list.note.startswith("1 session known")
+
+
+def test_texts_about_labels_are_whole_below_the_list(
+    shown: Shown, archive: Archive, settings: ServerSettings
+) -> None:
+    shown.window.resize(660, 590)  # what a screen of 768 leaves beside the panels
+    record(settings)
+    play(shown, archive)
+    player = shown.window.tabs.recordings.player
+    player.labelling.setChecked(True)
+    archive.labels.said = "labelled: walk, safe here, goes to the store with the next upload"
+    archive.labels.revision += 1
+    shown.draw()
+    bar = player.labels
+    bar.right.setText("falling predicted then: 100.0 % right, 0.0 % wrong, 0.0 % not said of 200 " * 3)
+    bar.right.show()
+    for _ in range(3):
+        QApplication.processEvents()
+    texts = (bar.said, bar.right)
+    assert all(one.height() >= one.heightForWidth(one.width()) > 0 for one in texts), "lines are cut"
+    assert bar.said.geometry().bottom() < bar.right.geometry().top()
+    assert bar.list.geometry().bottom() < bar.said.geometry().top()
 
 
 def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) -> None:
@@ -100,6 +124,20 @@ def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) ->
     shown.open("Cloud")
     assert shown.window.tabs.cloud.hint.isVisible()
     assert not shown.window.tabs.cloud.verify.isEnabled()
+
+
+def test_events_are_called_live_while_a_recording_is_played(
+    whole: Shown, full_window: MainWindow, bench: Bench, settings: ServerSettings, archive: Archive
+) -> None:
+    record(settings)
+    play(whole, archive)
+    bench.draw(full_window)
+    title = full_window.docks[2].titleBarWidget()
+    assert isinstance(title, DockTitle)
+    assert title.name.text() == "Events, live"
+    full_window.tabs.setCurrentIndex(0)
+    bench.draw(full_window)
+    assert title.name.text() == "Events"
 
 
 def test_recordings_can_be_looked_at_without_a_robot(

@@ -250,3 +250,18 @@ def test_a_busy_desk_computer_is_told_on_the_last_line_and_nothing_there_is_cut(
     assert "fps" in bar._window.shown
     assert rules.halved_numbers(bar) == []
     assert bar._window.is_whole
+
+
+@pytest.mark.parametrize(
+    ("apart_s", "said"),
+    [(0.04, ("25 fps",)), (0.5, ("busy", "2 fps")), (3.0, ("busy", "<1 fps"))],
+)
+def test_few_frames_a_second_are_a_busy_computer_on_the_last_line(
+    bar: StatusBar, bench: Bench, apart_s: float, said: tuple[str, ...]
+) -> None:
+    """It said 0 fps, and nothing of the computer."""
+    bar._frames.extend(apart_s * place for place in range(20))
+    bar.resize(1366, bar.height())
+    bar.refresh()
+    assert all(word in bar._window._wordings[0] for word in said)
+    assert all("busy" in wording for wording in bar._window._wordings) is ("busy" in said)

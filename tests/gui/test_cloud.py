@@ -66,7 +66,7 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     assert shown.window.tabs.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
-    assert "not reached, tried again by itself" in page.said.text()
+    assert "not reached, retried automatically" in page.said.text()
     assert page._list.note == "0 sessions known; others may be in the store"
     away[0] = False
     shown.until(lambda: shown.window.tabs.recordings.list.sessions.rowCount(), "came back")
@@ -89,11 +89,12 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
     cloud._recording.look()
     shown.draw()
-    assert "2 batches wait" in cloud.waiting.text()
-    assert "Not uploaded, tried again by itself: the store cannot be reached" in cloud.waiting.text()
+    assert "2 batches wait · 5.0 MiB on this computer · " in cloud.waiting.text()
+    assert "2 batches uploaded\n" in cloud.waiting.text()
+    assert "Not uploaded, retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
-    said = "what was recorded until now waits for the store: an upload failed, tried again by itself"
+    said = "what was recorded until now waits for the store: an upload failed, retried automatically"
     assert said in [item.text for item in bench.desk.news.items]
 
 
@@ -110,6 +111,10 @@ def test_while_the_store_is_away_the_button_tries_again_at_once(
     shown.draw()
     assert cloud.upload.text() == "Try again now"
     assert cloud.upload.isEnabled()
+    assert cloud.state.width() > cloud._cards["Store"].width() * 0.8, "a reason has all of the width"
+    again = next(one for one in cloud.findChildren(QPushButton) if one.text() == "Look again")
+    assert again.toolTip() != cloud.upload.toolTip(), "both say what they do"
+    assert again.geometry().bottom() <= cloud.state.geometry().top()
     keeper = FakeKeeper(report())
     cloud._recording = recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
     recording.rely_on(reach)
@@ -117,7 +122,7 @@ def test_while_the_store_is_away_the_button_tries_again_at_once(
     assert not reach.is_due, "nobody else looks again"
     cloud.upload.click()
     assert keeper.asked[0] == "upload"
-    said = "what was recorded until now waits for the store: it is not reached, tried again by itself"
+    said = "what was recorded until now waits for the store: it is not reached, retried automatically"
     assert said in [item.text for item in bench.desk.news.items]
     shown.until(lambda: reach.state is Reach.REACHED, "looked at once")
     cloud.upload.click()

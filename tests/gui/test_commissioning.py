@@ -1,5 +1,6 @@
 """The page that commissions a robot: every state at every size, by keyboard, and nobody answers twice."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -8,8 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QPushButton, QWidget
 
+from gateway.commission import controller, joints
+from server_gui.core.commissioning import messages
 from server_gui.core.commissioning.request import SUFFIX
 from server_gui.core.commissioning.stages import Stage
+from server_gui.views.commissioning.bar import APART
 from server_gui.views.commissioning.form import Form
 from server_gui.views.commissioning.page import CommissionPage
 from server_gui.views.confirmation import Question
@@ -271,7 +275,7 @@ def test_a_stop_is_proved_drive_by_drive_with_its_time_until_the_next_one(
     played.hear(told)
     draw(page)
     assert page.stopped.texts == [
-        ("node 5", "switch on disabled", "34 ms"),
+        ("node 5", "switch on disabled", "after 34 ms"),
         ("node 6", "operation enabled", "NOT CONFIRMED: unconfirmed"),
         ("node 7", "not known", "NOT CONFIRMED: unreachable"),
     ]
@@ -302,3 +306,80 @@ def test_the_form_knows_who_sits_at_the_window() -> None:
     form = Form("Ada")
     assert form.wish.who == "Ada"
     destroy(form)
+
+
+def test_a_stop_that_reaches_the_drives_only_is_said_beneath_the_stop_as_long_as_it_is_so(
+    page: CommissionPage, played: Played
+) -> None:
+    played.start()
+    draw(page)
+    assert page.bar.drives_only.isHidden()
+    played.hear({"say": controller.DRIVES_ONLY}, asks("How are the joints called?", 2))
+    draw(page)
+    assert page.bar.drives_only.text().startswith("▲ A STOP will reach the drives only")
+    played.hear({"say": "left knee is node 7."}, playing.stopped())
+    draw(page)
+    assert page.bar.drives_only.isVisible()
+    assert controller.DRIVES_ONLY.startswith(messages.DRIVES_ONLY)
+
+
+def test_a_drive_that_had_no_power_a_moment_before_has_only_answered(
+    page: CommissionPage, played: Played
+) -> None:
+    played.start()
+    played.hear(BEND)
+    played.talker.says(lives(BEND["number"], ("node 7", "no power", "")))
+    played.model.look()
+    played.model.stop()
+    played.hear(playing.stopped())
+    draw(page)
+    assert page.stopped.texts == [("node 7", "switch on disabled", "was off · answered after 34 ms")]
+    played.now_s += 60
+    played.model.stop()
+    played.hear(playing.stopped())
+    draw(page)
+    assert page.stopped.texts == [("node 7", "switch on disabled", "after 34 ms")], "that was long before"
+
+
+def test_what_leads_on_is_no_louder_than_stop_and_keeps_away_from_it(
+    page: CommissionPage, played: Played
+) -> None:
+    draw(page)
+    assert page.form.start.objectName() == "primary"
+    playing.stop_confirmed(played)
+    draw(page)
+    assert page.form.start.objectName() != "primary"
+    space = page.bar.stop.geometry().left() - page.form.start.geometry().right()
+    assert space >= APART
+
+
+def test_it_says_how_many_steps_are_done_instead_of_what_it_waits_for_again(
+    page: CommissionPage, played: Played
+) -> None:
+    played.start()
+    played.hear(playing.steps(), BEND)
+    draw(page)
+    assert re.fullmatch(r"\d+ of \d+ steps done", page.bar.words.text())
+
+
+def test_the_drive_that_has_moved_enough_is_bold_and_ticked(page: CommissionPage, played: Played) -> None:
+    played.start()
+    played.hear(BEND)
+    for far, other, bold in ((40, 0, False), (-900, 200, False), (-900, 3, True), (0, 0, False)):
+        moved = ("node 7", far, "counts moved"), ("node 9", other, "counts moved")
+        played.talker.says(lives(BEND["number"], *moved))
+        played.model.look()
+        draw(page)
+        (first, value), (_, unmoved) = page.question.live._rows
+        assert ("✓" in value.text(), value.font().bold(), first.font().bold()) == (bold, bold, bold)
+        assert not unmoved.font().bold()
+    assert (messages.LEAST_MOVE, messages.CLEARLY) == (joints.LEAST_MOVE, joints.CLEARLY)
+
+
+def test_while_a_robot_is_commissioned_an_alarm_of_another_names_its_robot(
+    full_window: MainWindow, played: Played
+) -> None:
+    full_window._desk.stations[1:] = []
+    assert not full_window.alarms.named
+    playing.hand(played)
+    assert full_window.alarms.named

@@ -86,3 +86,13 @@ def test_curves_and_names_of_two_recordings_are_seen_and_read(theme: Theme, look
         colour = theme.colour(name).name()
         assert contrast(colour, theme.colours.card) >= GRAPHIC, name
         assert contrast(colour, theme.colours.window) >= TEXT, name
+
+
+@pytest.mark.parametrize("look", [Look.DARK, Look.LIGHT])
+def test_words_are_read_on_the_tint_of_what_endangers_somebody(theme: Theme, look: Look) -> None:
+    theme.set(look)
+    tint = theme.urgent.name()
+    assert tint != theme.colours.card
+    for name in ("text", "dim"):
+        assert contrast(getattr(theme.colours, name), tint) >= TEXT, name
+    assert contrast(theme.colours.bad, tint) >= GRAPHIC

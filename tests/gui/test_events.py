@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.news import NewsKind
@@ -135,3 +136,35 @@ def test_each_stop_is_an_event_of_its_own(around: Around, bench: Bench) -> None:
         bench.station.tell(NewsKind.STOP, "STOP confirmed by all 6 drives")
     bench.draw(around)
     assert [one.text for one in around.events.lines].count("STOP confirmed by all 6 drives") == 2
+
+
+def test_active_alarms_stand_in_the_order_of_the_alarms_above_the_pages(around: Around, bench: Bench) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02")])
+    for station in (other, bench.station):
+        station.take([walking(100), looked(state="stale", problem="nothing for 2 s")])
+    bench.draw(around)
+    for selected in bench.desk.stations:
+        bench.desk.select(selected)
+        bench.draw(around)
+        strip = [station.title for station, _ in around.alarms.told if station is not None]
+        assert [line.robot for line in around.events.pinned] == strip
+        assert strip[0] == selected.title
+
+
+def test_a_reset_is_an_event_of_its_own_and_no_warning(around: Around, bench: Bench) -> None:
+    bench.station.reset()
+    bench.first.answer(Reset({}, {}, held=False))
+    bench.draw(around)
+    (line,) = (line for line in around.events.lines if "stop reset" in line.text)
+    assert (line.mark.shape, line.mark.colour, line.mark.word) == ("ring", "dim", "RESET")
+
+
+def test_only_whole_rows_of_events_are_shown(around: Around, bench: Bench) -> None:
+    for number in range(20):
+        bench.desk.news.add(NewsKind.CONTROL, "exo-01", f"deed {number}")
+    for high in (150, 163, 171, 188):
+        around.events.setFixedHeight(high)
+        bench.draw(around)
+        row = around.events.table.verticalHeader().defaultSectionSize()
+        assert around.events.table.viewport().height() % row == 0

@@ -356,3 +356,39 @@ def test_beside_the_demos_bar_a_small_laptop_shows_all_of_the_overview(
         click(demo.bar.tour.skip)
     assert window.tabs.overview.sections.isHidden()
     assert min(plot.plot._lines.height() for plot in window.tabs.overview._plots) >= 70
+
+
+@pytest.mark.parametrize("width", [1680, 1000])
+def test_panels_wait_for_the_first_robot(
+    qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path, width: int
+) -> None:
+    station = bench.desk.stations[0]
+    bench.desk.remove(station)
+    window = MainWindow(bench.desk, theme, QSettings(str(tmp_path / "k.ini"), QSettings.Format.IniFormat))
+    window.resize(width, 900)
+    window.show()
+    bench.draw(window)
+    assert not [dock for dock in window.docks if dock.isVisible()]
+    assert window.header.stop.isVisible()
+    assert window.empty.address.isVisible()
+    window.resize(2680 - width, 900)
+    bench.draw(window)
+    assert not [dock for dock in window.docks if dock.isVisible()], "nor where there is another room"
+    bench.desk.add(station)
+    bench.draw(window)
+    assert all(not dock.isHidden() for dock in window.docks)
+    destroy(window)
+
+
+def test_an_address_is_whole_in_the_field_for_the_first_robot(
+    qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path
+) -> None:
+    theme.set(scale=1.5)
+    bench.desk.remove(bench.desk.stations[0])
+    window = MainWindow(bench.desk, theme, QSettings(str(tmp_path / "k.ini"), QSettings.Format.IniFormat))
+    window.resize(1024, 700)
+    window.show()
+    bench.draw(window)
+    field = window.empty.address
+    assert field.width() > field.fontMetrics().horizontalAdvance("192.168.100.200:7420") + 8
+    destroy(window)

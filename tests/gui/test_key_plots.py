@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
 from PySide6.QtGui import QFontMetrics, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -20,13 +20,25 @@ from server_gui.views.overview.key_plot import SECONDS, KeyPlot
 from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.cursors import told
-from server_gui.views.widgets.time_axis import PAUSED
+from server_gui.views.widgets.time_axis import LAST, PAUSED
 from server_gui.views.widgets.value_axis import ValueAxis
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
 from tests.support.desk import described, looked, telemetry, walking
 
 HOUR_S = 3600.0
+
+
+class Painted(QObject):
+    """Counts how often a widget is painted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.count = 0
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        self.count += event.type() is QEvent.Type.Paint
+        return False
 
 
 @pytest.fixture
@@ -178,6 +190,16 @@ def test_what_happened_is_flagged_in_every_plot_at_its_instant(overview: Overvie
     overview._hover(-5.0)
     draw(overview)
     assert overview._plots[2].note == "stop F12 by jkim · −5 s"
+
+
+def test_the_end_of_the_time_axis_is_painted_anew_with_the_curves(overview: Overview) -> None:
+    """It said now below grey curves, and last below live ones, until the scene was drawn a frame later."""
+    plot, painted = overview._plots[0].plot, Painted()
+    plot.viewport().installEventFilter(painted)
+    plot.draw(object(), np.array([-1.0, 0.0]), [np.zeros(2)] * len(plot._curves), live=False)
+    QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
+    assert painted.count, "without the events of the scene, which come later"
+    assert plot.getPlotItem().getAxis("bottom").tickStrings([0.0], 1.0, 1.0) == [LAST]
 
 
 def test_the_pointer_reads_every_plot_at_one_time(overview: Overview, bench: Bench) -> None:

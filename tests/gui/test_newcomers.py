@@ -6,6 +6,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import NotConnected
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import ERROR, STATE, STOP, JointModel
@@ -87,9 +88,9 @@ def test_a_robot_that_is_linked_again_is_not_said_to_have_no_link_now(bench: Ben
     bench.station.stop("STOP button of the window")
     bench.first.fail(NotConnected(f"nothing was sent; {MANY}"))
     bench.look_again([walking(100), looked()])
-    (alarm,) = (one.alarm for one in bench.station.alarms.active if "STOP" in one.alarm.mark.word)
+    (alarm,) = (one.alarm for one in bench.station.alarms.active if one.alarm.kind is Kind.STILL_MOVING)
     assert alarm.line.endswith("STOP again; the STOP before failed: there was no link")
-    assert alarm.brief == "STOP NOT CONFIRMED: still moving: STOP again"
+    assert alarm.brief == "STILL MOVING: STOP again"
 
 
 def test_a_card_stays_small_however_much_is_wrong(around: Around, bench: Bench) -> None:

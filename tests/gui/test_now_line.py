@@ -5,11 +5,15 @@ import time
 
 import pytest
 
+from gateway.client import ConnectionState
 from gateway.wire.stop import Stopped
+from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.writing import Trial
+from server_gui.views.frame.header import _drives as header_drives
 from server_gui.views.marks import time_of_day
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
+from server_gui.views.predictions import doing
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
@@ -76,6 +80,48 @@ def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(
     assert overview.now.drives.detail.text() == "6/6 confirmed in 21 ms"
 
 
+@pytest.mark.parametrize("linked", [True, False])
+def test_a_held_stop_stays_in_headline_and_card_while_no_data_comes(
+    overview: Overview, bench: Bench, linked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said Drives not known, half a second after the last row."""
+    now_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    station = bench.station
+    station.take([walking(10), looked(), telemetry([now_ns], states, now_ns)])
+    station.stopping.answered(station.stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    station.stopping.answered_ms = 1498.0
+    if not linked:
+        station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 0)
+    assert not station.is_live
+    overview.read_now()
+    overview.refresh()
+    drives = overview.now.drives
+    since = f"STOPPED since {time_of_day(station.stopping.since_s or 0.0)}"
+    assert drives.main._wordings[0] == (since if linked else f"{since}, as far as is known")
+    assert drives._icon._mark.colour == "warn"
+    assert drives.detail._wordings[0].startswith("6/6 confirmed in 1498 ms · no data for 0.")
+    assert doing(station)[0].startswith("STOPPED" if linked else "STOPPED, as far as is known")
+    assert "no data for 0." in doing(station)[0]
+    assert all(words.startswith("STOPPED") for words in doing(station)), "also where there is little room"
+    assert header_drives(station).main == "Off when last seen"
+
+
+def test_drives_that_were_enabled_when_data_ended_are_not_called_stopped(
+    overview: Overview, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    states["left_knee.state"] = [4.0]
+    bench.station.take([walking(10), looked(), telemetry([now_ns], states, now_ns)])
+    bench.station.stopping.described(True, "by somebody")
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 0)
+    overview.read_now()
+    overview.refresh()
+    assert overview.now.drives.main.text() == "Drives not known"
+
+
 def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, bench: Bench) -> None:
     """It said Operation enabled, in large letters."""
     bench.station.take([walking(10), looked()])
@@ -84,7 +130,7 @@ def test_a_stop_that_is_not_confirmed_leads_the_overview(overview: Overview, ben
     overview.read_now()
     overview.refresh()
     drives = overview.now.drives
-    assert (drives.main.text(), drives._icon._mark.colour) == ("STOP NOT CONFIRMED", "bad")
+    assert (drives.main.text(), drives._icon._mark.colour) == ("STILL MOVING: STOP again", "bad")
     assert drives.detail.text() == "operation enabled · 6 of 6 enabled"
 
 

@@ -433,6 +433,20 @@ def test_what_the_latest_stop_did_is_the_last_column_to_go(bench: Bench, theme: 
     destroy(table)
 
 
+def test_a_column_of_errors_that_says_nothing_goes_before_angles(bench: Bench, theme: Theme) -> None:
+    bench.station.take([walking(50), looked()])
+    model = JointModel(bench.desk, theme)
+    table = JointTable(model, theme)
+    model.refresh()
+    table.show()
+    for width in range(900, 200, -20):
+        table.resize(width, 200)
+        if table.isColumnHidden(ANGLE) or table.isColumnHidden(TORQUE):
+            assert table.isColumnHidden(ERROR), width
+    assert table.isColumnHidden(ERROR)
+    destroy(table)
+
+
 def test_letters_of_the_sides_stand_on_no_leg(theme: Theme) -> None:
     metrics = QFontMetrics(theme.text_font(bold=True))
     leg = [QPointF(50, 20), QPointF(52, 50), QPointF(46, 80), QPointF(70, 82)]

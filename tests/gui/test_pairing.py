@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.access import changes
 from gateway.access.folder import AccessFolder
@@ -121,7 +121,6 @@ def test_a_link_that_is_pasted_as_an_address_opens_it(around: Around, shown: Sho
 @pytest.mark.parametrize(
     ("where", "code", "said"),
     [
-        ("", CODE, "an address is missing"),
         ("192.0.2.7", "12", "16 letters and digits"),
         ("gwrms://192.0.2.7", "", "HOST:PORT/CODE"),
     ],
@@ -218,3 +217,24 @@ def test_another_robot_s_key_is_said_loudly(around: Around, bench: Bench) -> Non
     assert worst is not None
     assert worst.kind is Kind.ANOTHER
     assert around.robots.cards[0].texts[1].startswith("ANOTHER ROBOT ANSWERS")
+
+
+def test_pairing_is_offered_once_there_is_something_to_pair_with(qt: QApplication) -> None:
+    dialog = PairingDialog()
+    assert not dialog.act.isEnabled()
+    dialog.address.setText("127.0.0.1:7420")
+    assert not dialog.act.isEnabled()
+    dialog.code.setText(CODE)
+    assert dialog.act.isEnabled()
+    dialog.code.clear()
+    dialog.address.setText(link("127.0.0.1:7420", CODE))
+    assert dialog.act.isEnabled(), "the code is in the link"
+    destroy(dialog)
+
+
+def test_the_command_for_the_robot_is_copied_with_one_click(qt: QApplication) -> None:
+    dialog = PairingDialog()
+    copy = next(one for one in dialog.findChildren(QPushButton) if one.text() == "Copy")
+    copy.click()
+    assert QApplication.clipboard().text() == "sudo gwrms keys pair"
+    destroy(dialog)

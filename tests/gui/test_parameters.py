@@ -424,3 +424,53 @@ def test_what_came_of_a_write_is_green_while_it_is_news(
     said, tone = _banner(bench.station, 0, "")
     assert re.fullmatch(r"\d\d:\d\d:\d\d  taken back", said)
     assert tone == "plain"
+
+
+def add_named(bench: Bench, name: str) -> None:
+    """Another robot that is called so here, whatever it calls itself."""
+    station = bench.add(name, 7421)
+    station.take([described()])
+    station.is_named = True
+
+
+def test_a_review_says_whose_parameters_it_writes_where_there_are_two_robots(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    assert panel.review.title.text() == "Review: this and nothing else is written"
+    add_named(bench, "exo-02")
+    panel.begin_review()
+    assert panel.review.title.text() == "Review – exo-01: this and nothing else is written"
+    assert "to exo-01" in panel.review.write_it.toolTip()
+
+
+@pytest.mark.parametrize("width", [1680, 1000])
+def test_the_panel_names_its_robot_where_there_are_two(window: MainWindow, bench: Bench, width: int) -> None:
+    window.resize(width, 900)
+    dock = window.docks[1]
+    assert dock.windowTitle() == "Parameters"
+    add_named(bench, "exo-02")
+    bench.draw(window)
+    assert dock.windowTitle() == "Parameters – exo-01"
+    assert dock.toggleViewAction().text() == "Parameters"
+    bench.desk.select(bench.desk.stations[1])
+    bench.draw(window)
+    assert dock.windowTitle() == "Parameters – exo-02"
+
+
+def test_a_long_name_is_cut_in_its_middle_in_the_title_of_the_panel(window: MainWindow, bench: Bench) -> None:
+    add_named(bench, "exo-02-" + 60 * "w" + "-left-lab")
+    bench.desk.select(bench.desk.stations[1])
+    bench.draw(window)
+    title = window.docks[1].windowTitle()
+    assert re.fullmatch("Parameters – exo-02.*-lab", title)
+
+
+def test_storing_is_not_offered_without_a_link(panel: ParametersPanel, bench: Bench) -> None:
+    panel.refresh()
+    assert panel.store_button.isEnabled()
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())])
+    panel.refresh()
+    assert not panel.store_button.isEnabled()
+    assert "no link" in panel.store_button.toolTip()

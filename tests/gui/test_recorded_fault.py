@@ -1,5 +1,9 @@
 """A recording with a fault in it: the alarm of that time is shown again, and leads to its signal."""
 
+import dataclasses
+import importlib.metadata
+import re
+
 import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import QPointF, Qt
@@ -7,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu
 
 from server_gui.core.archive.archive import Archive
-from server_gui.core.cloud.tape import Tape
+from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
@@ -146,7 +150,9 @@ def test_back_before_the_fault_its_line_says_that_there_was_none_then(
     archive.playback.seek(tape.first_ns + 1_000_000_000)
     shown.until(lambda: not player.alarms.told, "went back")
     shown.until(lambda: player.alarms.headline.text() == "No alarm then", "said so")
-    assert "buses and computers are not" in player.alarms.details.text(), "nobody has looked at these"
+    assert "trouble of its buses is on the time axis" in player.alarms.details.text(), (
+        "nobody has looked at these"
+    )
     assert player.alarms.isVisible(), "nothing moves"
 
 
@@ -196,12 +202,33 @@ def test_a_recording_that_stands_still_is_said_to_be_paused_alone(
     player.signals.pause.click()
     shown.draw()
     assert player.signals.said.text() == "Paused"
+    playback, tape = archive.playback, archive.playback.tape
+    assert tape is not None
+    player.signals.choose(["left_knee.current"])
+    for _ in range(2):  # it goes on, and stands still with the curve
+        player.signals.pause.click()
+        player.signals.refresh()
+    axis = player.signals.plots[0].plot.getPlotItem().getAxis("bottom")
+    at_s = (playback.position_ns - tape.first_ns) / 1e9
+    assert axis._since_s == pytest.approx(at_s, abs=0.1), "it counts as the bar below does"
+    [(step, offset)] = axis.tickSpacing(-5.0, 0.0, 500.0)
+    text = axis.tickStrings([offset - step], 1.0, step)[0]
+    assert re.fullmatch(r"\d:\d\d(\.0)?|\d:\d\d\.\d", text)
 
 
-def test_a_replay_says_of_what_it_shows_no_alarms(player: Player) -> None:
+def test_a_replay_says_that_buses_are_missing_in_it_only_where_they_are(
+    shown: Shown, archive: Archive, settings: ServerSettings, player: Player
+) -> None:
     assert player.alarms.isHidden(), "nothing was wrong, as far as is known"
     assert player.unseen.isVisible()
-    assert "without alarms of buses and computers" in player.unseen.text()
+    assert "trouble of its buses was not recorded" in player.unseen.accessibleName()
+    tape = archive.playback.tape
+    assert tape is not None
+    assert not tape.tells_of_buses, "nobody knows which version recorded it"
+    ours = {"gwrms collect": importlib.metadata.version("gwrms")}
+    assert dataclasses.replace(tape, session=replace(tape.session, versions=ours)).tells_of_buses
+    told = {"kind": "bus", "utc": as_time(tape.first_ns), "text": "main: full"}
+    assert dataclasses.replace(tape, events=[told]).tells_of_buses
 
 
 def test_a_gap_is_an_event_like_the_others(shown: Shown, archive: Archive, settings: ServerSettings) -> None:
@@ -213,6 +240,7 @@ def test_a_gap_is_an_event_like_the_others(shown: Shown, archive: Archive, setti
     shown.until(lambda: any(flag.kind is FlagKind.GAP for flag in player._in_order), "found it")
     player._list_events(menu := QMenu())
     assert any(said in action.text() for action in menu.actions()), "it is listed"
+    assert not any(action.icon().isNull() for action in menu.actions()), "with its flag"
     assert player.events.isEnabled()
     gap = next(flag for flag in player._in_order if flag.kind is FlagKind.GAP)
     assert player.timeline.told(gap) == said, "its tip"

@@ -3,6 +3,7 @@
 import concurrent.futures
 import contextlib
 import itertools
+import re
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -38,9 +39,12 @@ from server_gui.core.settings.server_file import (
 )
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.recording_chip import stop_question
+from server_gui.views.frame.status_bar import StatusBar
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from tests.fake_robot import FakeRobot
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Bench, destroy
 from tests.gui.running import running, wait
 
 ADDRESS = "192.0.2.7:7420"
@@ -191,8 +195,38 @@ def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> N
         keeper.answer = answer
         recording._asked_ns = None
         recording.look()
-    assert [item.text for item in news.items] == [f"no longer: {FULL.text}", FULL.text]
+    assert [item.text for item in news.items] == [f"over after 1 s: {FULL.text}", FULL.text]
     assert recording.said(ADDRESS).tone is Tone.GOOD
+
+
+def test_a_spool_that_can_be_read_again_is_said_to_be_so_with_how_long_it_was_not() -> None:
+    away = Alarm(AlarmKind.UNCLEARED, "the spool /spool cannot be read: No such file or directory")
+    keeper = FakeKeeper(report((away,)))
+    recording, news = looked(keeper)
+    keeper.answer, recording._asked_ns = report(), None
+    recording.look()
+    assert news.items[0].text == "over after 1 s: the spool /spool can be read again"
+    assert (news.items[0].kind, news.items[1].kind) == (NewsKind.STATE, NewsKind.WARNING)
+
+
+def test_without_the_spools_folder_the_remedy_is_to_create_it() -> None:
+    gone = Alarm(AlarmKind.SPOOL_FAILED, "the spool /spool cannot be read: No such file or directory")
+    recording, _ = looked(FakeKeeper(report((gone,))))
+    [one] = recording.alarms.active
+    assert one.alarm.check.startswith("create the folder, or check its mount")
+
+
+def test_a_recording_that_was_stopped_says_since_when_and_how_much_is_kept() -> None:
+    began = report()
+    link = replace(began.robots["exo-01"], recording_since_utc_s=time.time() - 41, notes="P01", session="s")
+    keeper = FakeKeeper(replace(began, robots={"exo-01": link}))
+    recording, _ = looked(keeper)
+    assert stop_question(recording).startswith("Stop “P01”, 0:41, of exo-01?")
+    recording.pause()
+    keeper.answer, recording._asked_ns = report(is_paused=True), None
+    recording.look()
+    said = recording.said(ADDRESS).text
+    assert re.fullmatch(r"Not recording: stopped · since \d\d:\d\d:\d\d · 0:4[12] kept", said)
 
 
 def test_a_store_that_is_away_is_a_warning_and_recording_goes_on() -> None:
@@ -200,6 +234,9 @@ def test_a_store_that_is_away_is_a_warning_and_recording_goes_on() -> None:
     said = recording.said(ADDRESS)
     assert said.tone is Tone.WARNING
     assert "store not reached, 3 to upload" in said.text
+    assert said.reason == "an upload failed"
+    recording.reach.looked(AWAY)
+    assert recording.said(ADDRESS).reason == "store not reached", "the header's second line begins with it"
     assert said.detail.startswith(AWAY)
     assert news.items[0].text == AWAY
 
@@ -250,6 +287,7 @@ def test_ctrl_r_asks_before_it_ends_a_recording_whose_chip_says_for_how_long_and
     bench.desk.recording.look()
     bench.draw(window)
     assert window.header.recording.main_text == "Not recording: stopped"
+    assert window.header.recording.detail_text.startswith("since ")
     window.header.recording.turn.click()
     asked = window.findChildren(Question)[-1]
     assert asked.field is not None
@@ -421,3 +459,14 @@ def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
         monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.0)
         (tmp_path / "spool").unlink()
         wait(lambda: rows(app, "exo-01") > 0, "recorded, once it could")
+
+
+def test_that_nothing_comes_is_said_in_the_last_line_however_little_room_there_is(
+    theme: Theme, bench: Bench
+) -> None:
+    bar = StatusBar(bench.desk, theme)
+    bench.desk.recording = looked(FakeKeeper(report(age_s=None)))[0]
+    bar.refresh()
+    assert "nothing comes" in bar.recording._wordings[0]
+    assert bar.recording._wordings[-1] == "nothing comes"
+    destroy(bar)

@@ -5,7 +5,9 @@ import time
 from gateway.client import ConnectionState, NotConnected
 from gateway.wire.stop import Stopped
 from server_gui.core.follow.events import LinkChanged
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import fault, settle
@@ -113,3 +115,55 @@ def test_a_long_name_is_whole_on_its_card_in_as_many_lines_as_it_needs(
     widest = max(label.fontMetrics().horizontalAdvance(line) for line in label.text().split("\n"))
     assert widest <= label.width()
     assert label.height() >= label.fontMetrics().lineSpacing() * len(label.text().split("\n"))
+
+
+def test_names_on_the_stops_of_two_cards_have_one_weight(window: MainWindow, bench: Bench) -> None:
+    other = bench.add("simulated-exoskeleton", 7421)
+    other.is_named = True
+    window.resize(1366, 768)
+    settle(window, bench)
+    bench.draw(window)  # once they have their widths
+    fonts = [card.stop._lines[1].bold() for card in window.robots.cards]
+    assert fonts == [False, False], "the long one has no room in bold"
+    other.name = "exo-2"
+    settle(window, bench)
+    bench.draw(window)
+    assert all(card.stop._lines[1].bold() for card in window.robots.cards)
+
+
+def test_stop_all_is_in_sight_beside_the_pages_where_the_list_of_robots_is_not(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    settle(window, bench)
+    window.docks[0].hide()
+    settle(window, bench)
+    assert not window.stop_everyone.isVisible(), "there is one robot"
+    bench.add("exo-02", 7421)
+    settle(window, bench)
+    assert window.stop_everyone.isVisible()
+    for scale in (1.0, 1.5, 2.0):
+        theme.set(scale=scale)
+        bench.draw(window)
+        assert window.stop_everyone.lines == ["ALL"], "STOP alone would be that of one robot"
+        assert window.stop_everyone.is_whole
+    asked: list[bool] = []
+    window.stop_all.connect(lambda: asked.append(True))
+    window.stop_everyone.pressed.emit()
+    assert asked
+    theme.set(scale=1.0)
+    settle(window, bench)
+    window.docks[0].show()
+    settle(window, bench)
+    assert not window.stop_everyone.isVisible()
+
+
+def test_a_robot_that_is_enabled_is_not_removed_without_saying_so(around: Around, bench: Bench) -> None:
+    bench.station.take([walking(300), looked()])
+    settle(around, bench)
+    around.robots.cards[0].remove.click()
+    (asked,) = around.findChildren(Question)
+    assert asked.words.text().startswith("exo-01 walks: its STOP leaves this window.")
+    asked.reject()
+    bench.desk.remove(bench.station)
+    newest = bench.desk.news.items[0]
+    assert "removed from this window while its drives were enabled" in newest.text

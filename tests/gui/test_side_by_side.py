@@ -53,6 +53,26 @@ def jump(shown: Shown, archive: Archive, player: Player, seconds: float) -> tupl
     return first, second
 
 
+def test_while_both_are_read_that_is_said_without_tools_and_with_one_button_for_cursors(
+    shown: Shown, player: Player
+) -> None:
+    player._end_comparing()
+    session, player.beside.session = player.beside.session, None
+    assert session is not None
+    player.show_beside(session)
+    player._refresh_beside()
+    assert player.signals.empty.text() == "reading both recordings …"
+    assert not player.signals.tools.isVisible(), "they would be there for a moment"
+    bar = player.beside_bar
+    assert bar.cursors.isVisibleTo(bar)
+    bar.tools.click()
+    assert not bar.cursors.isVisibleTo(bar), "the tools have that button"
+    bar.tools.click()
+    player.beside.close()
+    player._refresh_beside()
+    assert player.signals.empty.text().startswith("Tick channels")
+
+
 def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one_is_put_away(
     shown: Shown, archive: Archive, player: Player
 ) -> None:

@@ -19,7 +19,7 @@ from server_gui.views.confirmation import Question
 from server_gui.views.frame.header import Header, _outcome
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.stop_keys import StopKeys
-from server_gui.views.robots.reset import ask_clear
+from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
@@ -381,3 +381,14 @@ def test_a_name_that_has_room_beside_the_word_is_not_cut(theme: Theme) -> None:
     assert button.lines == ["simulated-exo"]
     assert button.is_whole
     destroy(button)
+
+
+def test_the_question_of_a_reset_begins_with_a_stop_that_is_not_confirmed(
+    window: MainWindow, bench: Bench
+) -> None:
+    bench.station.stop("test")
+    bench.first.answer(Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}))
+    question = ask_reset(window, bench.station)
+    assert question.words.text().startswith("STOP NOT CONFIRMED: ")
+    assert "First " in question.words.text().partition("Reset the stop")[0]
+    question.close()

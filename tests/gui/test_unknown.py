@@ -78,6 +78,7 @@ def test_balance_is_not_known_while_nothing_new_comes_but_a_fall_stays(
 ) -> None:
     for age_s, said in ((70.0, gone), (0.0, f"{label.capitalize()} 99 %")):
         bench.station.take([described(), walking(100, age_s), looked()])
+        bench.station.take_prediction(predicted("walk", {"walk": 0.99}))
         bench.station.take_prediction(predicted(label, {label: 0.99}, "falling"))
         assert f"Balance: {said}" in [line.text for line in lines(bench.station)]
 
@@ -132,3 +133,22 @@ def _least(image: QImage) -> int:
     """The lowest place that is drawn above the heel's middle, where there are cells all around."""
     middle = [image.pixelIndex(COLUMNS // 2, row) for row in range(ROWS // 3, ROWS - ROWS // 10)]
     return min(place for place in middle if place < STEPS)
+
+
+def test_balance_is_not_judged_before_the_activity_is_known_nor_without_the_model_s_sensors(
+    bench: Bench,
+) -> None:
+    """It said Steady 100 % beside Activity not known."""
+
+    def balance() -> str:
+        return next(line.text for line in lines(bench.station) if line.text.startswith("Balance"))
+
+    bench.station.take([described(), walking(10), looked()])
+    bench.station.take_prediction(predicted("steady", {"steady": 1.0}, "falling"))
+    assert balance() == "Balance: not judged"
+    bench.station.take_prediction(predicted("walk", {"walk": 0.99}))
+    assert balance() == "Balance: Steady 100 %"
+    bench.station.take([looked(state="lost", problem="no heartbeat")])
+    assert balance() == "Balance: not judged"
+    bench.station.take_prediction(predicted("fall", {"fall": 0.97}, "falling"))
+    assert balance() == "Balance: Fall 97 %", "a warning of a fall stays"

@@ -112,7 +112,7 @@ class Trials:
             self._forget(other, f"it was taken over by write {undo.write}")
         trial = self._trials[undo.write] = _Trial(undo, coming.session)
         trial.ends_ns = time.monotonic_ns() + round(trial_s * 1e9)
-        trial.set_timer(self._loop.call_later(trial_s, lambda: self._take_back(trial, "its time was over")))
+        trial.set_timer(self._loop.call_later(trial_s, lambda: self._take_back(trial, "time ran out")))
         self._changed()
         if coming.over is not None:
             self._take_back(trial, coming.over)

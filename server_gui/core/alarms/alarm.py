@@ -36,6 +36,7 @@ class Alarm:
     node: str = ""  # the bus of what is a node
     under: "tuple[Alarm, ...]" = ()  # what it explains
     aside: str = ""  # said only where there is room for all
+    why: str = ""  # more of the cause, below the line: what is to be done stands in it
 
     @property
     def key(self) -> tuple[Kind, str]:
@@ -169,6 +170,8 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         since_s = now_s if alarm.since_s is None else alarm.since_s
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)
         return Active(alarm, since_s, at_ns)
+    if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
+        return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
     return dataclasses.replace(before, alarm=alarm)
 
 

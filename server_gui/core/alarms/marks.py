@@ -23,6 +23,7 @@ GLYPHS: Final = {
     "half": "◐",
     "cross": "✕",
     "square": "■",
+    "box": "□",
     "triangle": "▲",
     "diamond": "◆",
 }

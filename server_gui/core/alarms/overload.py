@@ -10,7 +10,11 @@ from server_gui.core.follow.missing_pdos import BUSY_PERCENT
 from server_gui.core.follow.robot import Robot
 
 OURS: Final = "this computer is overloaded, end other programs on it first"
-THEIRS: Final = "the robot's computer is overloaded, see what keeps it busy first (gwrms blame)"
+THEIR_LOAD: Final = "the robot's computer is overloaded"
+THEIRS: Final = f"{THEIR_LOAD}, see what keeps it busy first (gwrms blame)"
+BLAMED: Final = (
+    "a simulated robot has no wires: see what keeps this computer busy (gwrms blame), and "  # besides
+)
 UNPLUGGED: Final = ("does not exist", "went away")  # as drivers say of a port
 ALSO: Final = "; also "  # begins what is to be checked besides
 PARTS: Final = frozenset({Kind.NO_DATA, Kind.LOST, Kind.PART_STALE})
@@ -27,22 +31,35 @@ def overloaded(robot: Robot, *, is_ours: bool) -> tuple[str, ...]:
     return (*(THEIRS,) * is_theirs, *(OURS,) * is_ours)
 
 
-def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> Iterator[Alarm]:
+def is_unplugged(alarm: Alarm) -> bool:
+    """Return whether a driver says that its port is not there: no load takes one away."""
+    return any(word in alarm.what for word in UNPLUGGED)
+
+
+def load_first(
+    alarms: Iterable[Alarm], first: tuple[str, ...], parts: int, *, wired: bool = True
+) -> Iterator[Alarm]:
     """Yield the alarms; of what is silent or stale the overloaded computers are checked first.
 
     Not of what is unplugged: no load takes a port away. Nor, where most of so many `parts` are well, of those
-    that are not: a load makes all of them late, so it is named after their own cable.
+    that are not: a load makes all of them late, so it is named after their own cable, where they have one
+    (`wired`). What an alarm says itself of the robot's computer is not said again.
     """
     found = list(alarms)
-    late = [
-        one for one in found if one.kind in SILENT | BUSES and not any(word in one.what for word in UNPLUGGED)
-    ]
-    is_common = 2 * sum(one.kind in PARTS for one in late) >= parts
+    late = [one for one in found if one.kind in SILENT | BUSES and not is_unplugged(one)]
+    is_common = not wired or 2 * sum(one.kind in PARTS for one in late) >= parts
+    every = first
     for one in found:
+        first = tuple(said for said in every if said != THEIRS or THEIR_LOAD not in one.what)
         if not first or one not in late:
             yield one
         elif one.kind in PARTS and not is_common:
             also = (text.replace(" first", "") for text in first)
             yield dataclasses.replace(one, check=ALSO.join(filter(None, (one.check, *also))))
         else:
-            yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, one.check))))
+            yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, _besides(one.check)))))
+
+
+def _besides(check: str) -> str:
+    """Return what is to be checked besides the load, which is named already."""
+    return check.replace(BLAMED, "")

@@ -6,37 +6,43 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.client import NOTHING_SENT, ConnectionState
+from gateway.client import ConnectionState
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.causes import Stall, stood_still
+from server_gui.core.alarms.drive_states import (
+    device_of,
+    drives_did,
+    listed,
+    state_words,
+)
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
 from server_gui.core.alarms.simulated import is_simulated, without_wires
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
+from server_gui.core.alarms.unconfirmed import unconfirmed_alarm
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
 EVERY_OFF: Final = "every drive is off"
-STILL_MOVING: Final = "still moving: STOP again"
 OFF: Final = frozenset({"switch on disabled"})
 # Why a robot does not drive its wearer.
 HELD: Final = "a stop is held"
 STOPPING: Final = "drives stop"
 IN_FAULT: Final = "a drive is in fault"
 NONE_ENABLED: Final = "no drive is enabled"
-MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
 _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
+_MISSING: Final = re.compile(r"(?<=heartbeat has been missing for )(?=\d)")  # it is so still, and longer
 _ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
 _ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
@@ -72,7 +78,8 @@ class Facts:
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
-    return load_first(without_wires(_found(facts), facts.robot), first, len(facts.robot.parts))
+    told = without_wires(_found(facts), facts.robot)
+    return load_first(told, first, len(facts.robot.parts), wired=not is_simulated(facts.robot))
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
@@ -99,17 +106,7 @@ def _found(facts: Facts) -> Iterator[Alarm]:
 
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
-        now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
-        what = STILL_MOVING if moving else stopping.why
-        yield Alarm(
-            Kind.NOT_STOPPED,
-            "",
-            what,
-            did=now,
-            check=", ".join(remedy(robot)),
-            since_s=stopping.since_s,
-            aside=f"the STOP before failed: {_then(stopping.why)}" if moving else "",
-        )
+        yield unconfirmed_alarm(robot, stopping)
     elif stopping.held:
         what, by = stopping.said
         yield Alarm(
@@ -122,18 +119,13 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
-        what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
+        what = EVERY_OFF if set(state_words(robot).values()) <= OFF else drives_did(robot) or EVERY_OFF
         yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
 
 
 def go_on(kind: Kind, robot: Robot) -> str:
     """Return how to go on after a stop, as the robot's gateway may."""
-    return check_of(kind, role=role_of(robot), simulated=is_simulated(robot))
-
-
-def _then(why: str) -> str:
-    """Return why a STOP failed, said when that is past: there is a link again."""
-    return "there was no link" if why.startswith(NOTHING_SENT) else why
+    return check_of(kind, role=role_of(robot), start_by=robot.start_by)
 
 
 def role_of(robot: Robot) -> str | None:
@@ -141,12 +133,9 @@ def role_of(robot: Robot) -> str | None:
     return None if robot.description is None else robot.description.role
 
 
-def remedy(robot: Robot) -> tuple[str, ...]:
-    """Return what to do after a STOP that nobody has confirmed, the first thing first."""
-    is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
-    if is_off:
-        return ("STOP again to be sure",)
-    return ("STOP again", "or use the hardware stop") if _is_live(robot) else ("use the hardware stop",)
+def any_enabled(robot: Robot) -> bool:
+    """Return whether some drive is enabled, as far as is known."""
+    return ENABLED in state_words(robot).values()
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
@@ -154,62 +143,15 @@ def _after_stop(robot: Robot, stopping: StopProgress) -> str:
     shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
     every = "all " if len({proof.state for proof in stopping.proofs.values()}) == 1 else ""
     return (
-        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, drives_did(robot))))
     )
-
-
-def _after_unconfirmed(robot: Robot) -> str:
-    """Return what the robot does after a STOP that nobody has confirmed."""
-    if not _is_live(robot):
-        return "what it does now is not known"
-    moving = _moving(robot)
-    if moving:
-        return f"enabled or moving: {_listed(moving)}"
-    return _drives_did(robot)
-
-
-def any_enabled(robot: Robot) -> bool:
-    """Return whether some drive is enabled, as far as is known."""
-    return ENABLED in _words(robot).values()
-
-
-def _moving(robot: Robot) -> list[str]:
-    """Return joints whose drive is enabled, or that turn."""
-    words = _words(robot)
-    return [
-        joint
-        for joint in robot.names("joint")
-        if words[joint] == ENABLED or abs(robot.values.get(f"{joint}.velocity") or 0.0) > MOVES
-    ]
-
-
-def _drives_did(robot: Robot) -> str:
-    words = _words(robot)
-    if not words:
-        return ""
-    if not _is_live(robot):
-        return "what its drives do now is not known"
-    enabled = [joint for joint, word in words.items() if word == ENABLED]
-    if None in words.values():
-        return (
-            f"the state of {_listed([joint for joint, word in words.items() if word is None])} is not known"
-        )
-    if enabled:
-        return f"{len(enabled)} of {len(words)} drives are enabled still"
-    states = dict.fromkeys(str(word) for word in words.values())
-    return f"no drive is enabled: {', '.join(_counted(words, state, len(states)) for state in states)}"
-
-
-def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
-    count = list(words.values()).count(state)
-    return f"all {count} drives in {state}" if states == 1 else f"{count} {state}"
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:
     """Return what the robot did about it, as far as is known."""
     held = f"STOP is held ({stopping.reason})" if stopping.held and stopping.reason else ""
     held = held or ("STOP is held" if stopping.held else "")
-    return "; ".join(filter(None, (held, _drives_did(robot))))
+    return "; ".join(filter(None, (held, drives_did(robot))))
 
 
 # --- the link
@@ -278,7 +220,8 @@ def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
 def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> Iterator[Alarm]:
     if robot.is_recording:
         return
-    where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
+    problem = _MISSING.sub("more than ", _LASTING.sub("", part.problem or ""))
+    where = _where(robot, part.name)
     kind = _KINDS.get(part.state)
     channel = _channel(robot, part.name, None)
     is_now = not robot.is_stale()
@@ -356,7 +299,7 @@ def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
         yield Alarm(
             Kind.NO_DATA,
             "devices",
-            f"not read yet: {_listed(names)}",
+            f"not read yet: {listed(names)}",
             check=check_of(Kind.NO_DATA),
             is_now=not robot.is_stale(),
         )
@@ -384,7 +327,7 @@ def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts, *, is_now: bool) -> 
     why = _told(facts.journal, rule.name) or rule.reason or blind or f"{rule.watch} {rule.limit}"
     actions = ", ".join(action.replace("_", " ") for action in rule.actions)
     did = f"the rule's actions: {actions}" if kind is Kind.GUARD and actions else ""
-    drives = _drives_did(facts.robot) if kind is Kind.GUARD else ""
+    drives = drives_did(facts.robot) if kind is Kind.GUARD else ""
     on = next((name for name in rule.on if name in facts.robot.parts), None)
     channel = None if on is None else _channel(facts.robot, on, None, (rule.watch,))
     did = "; ".join(filter(None, (did, drives)))
@@ -415,7 +358,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
 
 def undriven(robot: Robot, stopping: StopProgress) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
-    words = [None if word is None else word.lower() for word in _words(robot).values()]
+    words = [None if word is None else word.lower() for word in state_words(robot).values()]
     if stopping.held:
         return HELD
     if _QUICK_STOP in words:
@@ -445,19 +388,13 @@ def _of_danger(facts: Facts) -> Iterator[Alarm]:
 def _where(robot: Robot, name: str) -> str:
     """`left knee, node 2 on can0`."""
     spoken, bus = name.replace("_", " "), _bus(robot, name)
-    return f"{spoken}, node {_device(robot, name)['node_id']} on {bus}" if bus else spoken
+    return f"{spoken}, node {device_of(robot, name)['node_id']} on {bus}" if bus else spoken
 
 
 def _bus(robot: Robot, name: str) -> str:
     """Return the bus of a component that is a node."""
-    device = _device(robot, name)
+    device = device_of(robot, name)
     return str(device.get("bus", "its bus")) if "node_id" in device else ""
-
-
-def _device(robot: Robot, name: str) -> Mapping[str, Any]:
-    known = () if robot.description is None else robot.description.components
-    device = next((part.device for part in known if part.name == name), None)
-    return device if isinstance(device, dict) else {}
 
 
 def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] = ()) -> str | None:
@@ -470,18 +407,6 @@ def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] =
         if f"{name}.{quantity}" in names:
             return f"{name}.{quantity}"
     return names[0] if names else None
-
-
-def _words(robot: Robot) -> dict[str, str | None]:
-    return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
-
-
-def _is_live(robot: Robot) -> bool:
-    return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(name.replace("_", " ") for name in names)
 
 
 def _utc_s(monotonic_ns: int) -> float:

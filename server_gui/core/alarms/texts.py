@@ -13,6 +13,7 @@ __all__ = ["TEXTS", "Kind", "Text", "check_of", "error_check", "error_text"]
 class Kind(Enum):
     """What sort of thing is wrong; the worst comes first."""
 
+    STILL_MOVING = "STILL MOVING"  # after a STOP that is not confirmed
     NOT_STOPPED = "STOP NOT CONFIRMED"
     ANOTHER = "ANOTHER ROBOT ANSWERS"
     NEVER_REACHED = "never reached"
@@ -32,13 +33,16 @@ class Kind(Enum):
     STALLED = "computer paused"
     UNKNOWN = "state not known"
     BUS_BUSY = "bus busy"
-    BUS = "bus trouble"
     BLIND = "guard blind"
     DANGER_ADVICE = "danger possible"
-    REPORTS = "warning"
     RECORDING = "recording"
     UPLOAD = "store"
+    BUS = "bus trouble"
+    REPORTS = "warning"
     RESET = "stop reset"
+
+
+UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.NOT_STOPPED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +60,10 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 _ENABLE: Final = "enable the drives (gwrms enable, or the robot's controller)"
 # Where only the controller may: the gateway is an observer.
 _START: Final = "enable the drives: start the robot's controller again"
-_START_SIMULATED: Final = f"{_START} (Start walking, or gwrms sim-fault --dir DIR --controller start)"
 RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
+        _text(Kind.STILL_MOVING, "square", "bad", "STOP again, or use the hardware stop"),
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
         _text(
             Kind.ANOTHER,
@@ -169,10 +173,14 @@ _CHECKS: Final = {
 }
 
 
-def check_of(kind: Kind, component: str = "", role: str | None = None, *, simulated: bool = False) -> str:
+def check_of(kind: Kind, component: str = "", role: str | None = None, *, start_by: str = "") -> str:
     """Return what to check, by the kind of component too, and by the gateway's role on the bus.
 
-    What only a simulator can do is said only of a `simulated` robot.
+    `start_by` is what starts the controller of this very robot, where that is known: of our simulator.
     """
     check = _CHECKS.get((kind, component), TEXTS[kind].check)
-    return check.replace(_ENABLE, _START_SIMULATED if simulated else _START) if role == "observer" else check
+    return (
+        check.replace(_ENABLE, f"{_START} ({start_by})" if start_by else _START)
+        if role == "observer"
+        else check
+    )

@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Final
 
 import msgspec
@@ -15,7 +16,6 @@ from server_gui.core.cloud import spool_reader, usage
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
-from server_gui.core.recording.losses import told_time
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
@@ -53,6 +53,7 @@ class Library:
         self._looking = False
         self._knocking = False
         self._knock_again = False
+        self._known: dict[tuple[str, str], Session] = {}  # as they were when their store was last read
 
     def close(self, within_s: float) -> bool:
         """Look no more; False where a look under way hangs. Idempotent."""
@@ -98,6 +99,10 @@ class Library:
         named = (each for each in self.found.sessions if (each.robot, each.session) == (robot, name))
         return next(named, None)
 
+    def known_before(self, session: Session) -> Session | None:
+        """Return it as it was when the store was last read; None where that was before it began."""
+        return self._known.get((session.robot, session.session))
+
     def files(self, folder: str) -> "Future[list[Object]]":
         """Return every object of the store below a folder."""
         url = self.settings.store.url
@@ -112,6 +117,8 @@ class Library:
         ) or self.revision == 0:
             self.revision += 1
         self.found = found
+        if found.problem is None:
+            self._known = {(each.robot, each.session): each for each in found.sessions}
         if found.is_reached:
             self.reach.listed(found.problem)
         self._reached(found)
@@ -171,10 +178,15 @@ def _gone(settings: ServerSettings) -> str | None:
     if newest is None or newest.url != url:
         return None
     ends = [part.end_us for part in newest.parts if part.end_us is not None]
-    what = (
-        f"what was recorded until {told_time(max(ends) * 1_000, 'seconds')}" if ends else "what was recorded"
-    )
+    what = f"what was recorded until {_local(max(ends) / 1e6)}" if ends else "what was recorded"
     return f"there is no store at {url} any more; {what} was uploaded to it and is not kept here"
+
+
+def _local(utc_s: float) -> str:
+    """Return a time as the clock on the wall has it, with its day where that is not today."""
+    then = datetime.fromtimestamp(utc_s).astimezone()
+    is_today = then.date() == datetime.now().astimezone().date()
+    return f"{then:%H:%M:%S}" if is_today else f"{then:%Y-%m-%d %H:%M:%S}"
 
 
 def _waiting(settings: ServerSettings) -> list[Session]:

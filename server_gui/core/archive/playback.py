@@ -84,6 +84,7 @@ class PlayedRobot(Robot):
     shown_ns: int = 0  # UTC
     row_ns: int | None = None  # UTC of the newest row
     stamp_ns: int | None = None  # and on the robot's clock
+    began_ns: int | None = None  # UTC of the recording's first row
     rows_per_s: float = 0.0
     is_recording: bool = True
     # Parameters of its start, where nobody knows of later changes: then these are not known now.
@@ -91,6 +92,12 @@ class PlayedRobot(Robot):
 
     def now_s(self) -> float:
         return self.shown_ns / 1e9
+
+    def session_s(self, stamp_ns: int) -> float | None:
+        """Return how long after its beginning this was, on the robot's clock; None where not known."""
+        if self.row_ns is None or self.stamp_ns is None or self.began_ns is None:
+            return None
+        return (stamp_ns + self.row_ns - self.stamp_ns - self.began_ns) / 1e9
 
     def age_s(self, now_ns: int | None = None) -> float | None:  # noqa: ARG002 - a recording has its own now
         return None if self.row_ns is None else max(0, self.shown_ns - self.row_ns) / 1e9
@@ -261,6 +268,7 @@ class Playback:
     def _begin_anew(self, tape: Tape) -> None:
         """Begin anew: to views, a jump is as if the robot's computer had started anew."""
         self._jumps += 1
+        self._robot.began_ns = tape.first_ns
         self._robot.row_ns = self._robot.stamp_ns = None
         self._said = {}
         station = self.desk.stations[0]

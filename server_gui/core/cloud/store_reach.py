@@ -9,7 +9,7 @@ from gateway.amounts import NONE
 
 LOOK_S: Final = 15.0  # between two looks at a store that was reached
 AGAIN_S: Final = 5.0  # before one that was away is tried again
-AGAIN: Final = "tried again by itself"  # as every page says it
+AGAIN: Final = "retried automatically"  # as every page says it
 KNOWN_S: Final = 60.0  # after a look: longer than one of S3 that fails, later nobody knows
 
 

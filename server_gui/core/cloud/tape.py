@@ -1,5 +1,6 @@
 """A recorded session to be played: its rows by time, from the store and from what waits in the spool."""
 
+import importlib.metadata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -13,7 +14,9 @@ from ml.store import NoSuchTable, StoreError, sessions
 from ml.store.labels import utc_ns
 from ml.store.sessions import Channel, Session
 from server_gui.core.cloud.recordings import Recorded, Recordings
+from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.records import RECORDER
 from server_gui.core.recording.rows import Floats, Ints
 from server_gui.core.settings.server_file import ServerSettings
 
@@ -74,6 +77,12 @@ class Tape:
     _recorded: Recorded = field(repr=False)
     _settings: ServerSettings = field(repr=False)
     is_partial: bool = False  # the store, which may have more of it, was not reached
+
+    @property
+    def tells_of_buses(self) -> bool:
+        """Whether trouble of its buses would be among its events: this version records that."""
+        is_ours = self.session.versions.get(RECORDER) == importlib.metadata.version("gwrms")
+        return is_ours or any(event.get("kind") == EventKind.BUS.value for event in self.events)
 
     @classmethod
     def open(cls, settings: ServerSettings, session: Session) -> Self:

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Final, Protocol
 
 from server_gui.core.commissioning import messages
@@ -29,6 +30,7 @@ GUARD_S: Final = 0.4  # a click within it was meant for the question before
 STOP_S: Final = 2.5  # for the command to have stopped the drives; then another one does it
 KILL_S: Final = 2.5  # for one that was killed to be gone; then the other one begins all the same
 STOPPER_S: Final = 30.0  # for that one to say what the drives confirm, also on another computer
+OFF_S: Final = 1.0  # beyond it nobody knows whether a drive still has no power
 OLD_S: Final = 2.0  # live values beyond it are not live
 SILENT_S: Final = 60.0  # that long no step takes
 MOVING_SILENT_S: Final = 2.0  # and while a joint is under power that is told again and again
@@ -97,6 +99,8 @@ class Commissioning:
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
         self.written: WrittenMessage | None = None
         self.problem = ""  # in words, of whatever is wrong now
+        self.drives_only = False  # a STOP does not reach what commands them
+        self.off: frozenset[str] = frozenset()  # drives that had no power when STOP was asked for
         self.proof: StoppedMessage | None = None  # what the drives have said to the latest STOP
         self.log: deque[str] = deque(maxlen=MOST_LINES)
         self.logged = 0  # lines ever
@@ -124,6 +128,17 @@ class Commissioning:
     @property
     def runs(self) -> bool:
         return self.look_of.runs
+
+    @property
+    def name(self) -> str:
+        """The robot's name, which its file has; "" before one was named."""
+        return "" if self.wish is None else Path(self.wish.file).stem
+
+    @property
+    def progress(self) -> str:
+        """How many steps are done, or passed; "" before it has said its steps."""
+        done = sum(one.state in ("done", "passed") for one in self.steps)
+        return f"{done} of {len(self.steps)} steps done" if self.steps else ""
 
     @property
     def can_start(self) -> bool:
@@ -168,7 +183,7 @@ class Commissioning:
         self.wish = wish
         self.question, self.steps, self.proposed, self.written = None, (), None, None
         self.problem, self._error, self._stopped, self._stop_s, self._ending = "", "", None, None, False
-        self.proof = None
+        self.proof, self.drives_only, self.off = None, False, frozenset()
         self._live, self._powered = (), False
         self.news.clear()
         self._note(LogLineKind.NOTED, wish.typed)
@@ -195,6 +210,8 @@ class Commissioning:
         if self._stop_s is None or not self.runs:
             self._stop_s, self._stopped = self._clock(), None  # what was confirmed before is of before
             self.proof = None
+            is_new = self._clock() - self._live_s < OFF_S
+            self.off = messages.without_power(self._live) if is_new else frozenset()
         talker = self._talker
         if talker is not None:
             talker.send(messages.STOP)
@@ -270,6 +287,7 @@ class Commissioning:
 
     def _said(self, line: Message) -> None:
         self._note(LogLineKind.SAID, line.say or "")
+        self.drives_only = self.drives_only or (line.say or "").startswith(messages.DRIVES_ONLY)
         if line.file:
             self.proposed = (line.file, line.say or "")
         else:

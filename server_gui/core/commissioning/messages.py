@@ -1,5 +1,6 @@
 """The messages of `gwrms commission --json`, a line each; an unknown one is shown as it is."""
 
+from collections.abc import Collection, Iterable
 from typing import Final
 
 import msgspec
@@ -9,6 +10,11 @@ from gateway.units import with_minus
 NOT_SAID: Final = "not known"
 CONFIRMED: Final = "confirmed"
 NOT_CONFIRMED: Final = "NOT CONFIRMED"
+DRIVES_ONLY: Final = "A STOP will reach the drives only, and what commands them goes on"
+MOVED: Final = "counts moved"  # unit of how far a drive has counted since it was asked to be moved
+LEAST_MOVE: Final = 50  # as the command judges it
+CLEARLY: Final = 10  # times as far as any other drive
+NO_POWER: Final = "no power"
 ENTER: Final = " Then press Enter."
 
 
@@ -68,19 +74,42 @@ class StoppedMessage(msgspec.Struct, frozen=True):
         """Return whether this drive has."""
         return self.drives.get(drive) == CONFIRMED
 
-    @property
-    def rows(self) -> tuple[tuple[str, str, str], ...]:
-        """A row a drive: its name, its state, and when it confirmed the STOP; else that it did not."""
+    def rows(self, off: Collection[str] = ()) -> tuple[tuple[str, str, str], ...]:
+        """Return a row a drive: its name, its state, and when it confirmed the STOP; else that it did not.
+
+        Those that were `off` before had nothing to stop: they have only answered.
+        """
         return tuple(
-            (drive, self.states.get(drive, NOT_SAID), self._when(drive, said))
+            (drive, self.states.get(drive, NOT_SAID), self._when(drive, said, was_off=drive in off))
             for drive, said in self.drives.items()
         )
 
-    def _when(self, drive: str, said: str) -> str:
+    def _when(self, drive: str, said: str, *, was_off: bool) -> str:
         after_ms = self.after_ms.get(drive)
         if said != CONFIRMED:
             return f"{NOT_CONFIRMED}: {said}"
-        return "confirmed" if after_ms is None else f"{max(after_ms, 1.0):.0f} ms"
+        if after_ms is None:
+            return "was off · answered" if was_off else "confirmed"
+        after = f"after {max(after_ms, 1.0):.0f} ms"
+        return f"was off · answered {after}" if was_off else after
+
+
+def mover(readings: Iterable[ReadingMessage]) -> str:
+    """Return the drive that has moved enough, and far more than every other; "" while none has."""
+    moved = {
+        one.name: abs(one.value)
+        for one in readings
+        if one.unit == MOVED and isinstance(one.value, int | float)
+    }
+    order = sorted(moved, key=lambda name: moved[name], reverse=True)
+    if not order or moved[order[0]] < LEAST_MOVE:
+        return ""
+    return "" if len(order) > 1 and moved[order[1]] * CLEARLY > moved[order[0]] else order[0]
+
+
+def without_power(readings: Iterable[ReadingMessage]) -> frozenset[str]:
+    """Return the drives that say that they have no power."""
+    return frozenset(one.name for one in readings if str(one.value).startswith(NO_POWER))
 
 
 class Error(msgspec.Struct, frozen=True):

@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.stop_all import StopAll, StopAllResult
 from server_gui.core.evidence.file import EditEvidence
-from server_gui.core.follow.news import News
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.tuning.stop import Sent
 
@@ -43,6 +44,7 @@ class Desk:
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
+        self.commissions: Callable[[], bool] = lambda: False  # whether a robot is commissioned in this window
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:
@@ -70,6 +72,16 @@ class Desk:
         for station in self.stations:
             station.flag(text, ago_s)
 
+    @property
+    def whose(self) -> str:
+        """Name of the robot that is looked at, where there are others; "" where it goes without saying."""
+        return self.selected.title if self.selected is not None and self.has_several else ""
+
+    @property
+    def has_several(self) -> bool:
+        """Whether a robot is to be named: there are others, or one that is commissioned beside it."""
+        return len(self.stations) > 1 or self.commissions()
+
     def add(self, station: Station) -> None:
         """Add a robot; the first is selected."""
         self.stations.append(station)
@@ -79,6 +91,8 @@ class Desk:
 
     def remove(self, station: Station) -> None:
         """Look at it no more; another one is selected where it was."""
+        if not station.robot.is_recording:
+            station.tell(NewsKind.CONTROL, f"removed from this window{_left_as(station)}")
         self.stations.remove(station)
         if self.selected is station:
             self.select(self.stations[0] if self.stations else None)
@@ -110,3 +124,12 @@ class Desk:
         if found is None:
             self._stop_all = None
         return found
+
+
+def _left_as(station: Station) -> str:
+    """Return how a robot is that nobody sees any more here, in words; "" where nothing of it is enabled."""
+    if not station.is_live:
+        return "; whether its drives are enabled was not known"
+    return (
+        " while its drives were enabled: its STOP is not here any more" if any_enabled(station.robot) else ""
+    )

@@ -1,11 +1,21 @@
 """Flags of a robot as its events come: of its drives' states, its journal, and its buses."""
 
+import time
 from collections.abc import Iterator
 
 from server_gui.core.desk.flags import Flag, FlagKind, StateWatch, of_journal
 from server_gui.core.follow.events import BusesSeen, Event, Journalled, Telemetry
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.bus_turns import BusTurns
+from server_gui.core.tuning.stop import StopProgress
+
+
+def of_stop(stopping: StopProgress, newest_ns: int | None, age_s: float | None) -> Iterator[Flag]:
+    """Yield a STOP that is not confirmed, on the axis of rows whose newest is so old: it may be in a gap."""
+    if stopping.is_unproven and None not in (stopping.at_ns, newest_ns, age_s):
+        ago_ns = time.monotonic_ns() - (stopping.at_ns or 0)
+        at_ns = (newest_ns or 0) + round((age_s or 0.0) * 1e9) - ago_ns
+        yield Flag(at_ns, f"STOP NOT CONFIRMED: {stopping.why}", FlagKind.UNPROVEN)
 
 
 class FlagWatch:

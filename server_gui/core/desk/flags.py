@@ -1,6 +1,7 @@
 """What has happened on the axis of time: stops, faults, buses, writes, marks; live or of a recording."""
 
 import bisect
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -15,6 +16,8 @@ KEPT: Final = 500
 SOON_NS: Final = 1_000_000_000  # after a fault: then its code is of it
 ASKED_FOR: Final = "asked for"  # with no word of by whom
 TAKEN_BACK: Final = "taken back"  # as the robot's journal has it
+WINDOW: Final = re.compile(r"gwrms gui \((.+):\d+\)")
+HERE: Final = frozenset({"127.0.0.1", "[::1]", "::1"})
 JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
 
 
@@ -22,6 +25,7 @@ class FlagKind(Enum):
     """What sort of thing happened; the word is shown."""
 
     STOP = "stop"
+    UNPROVEN = "stop not confirmed"  # that this window has sent
     FAULT = "fault"
     WRITE = "write"
     TRIAL = "trial"
@@ -154,11 +158,32 @@ def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
 def _said(entry: Entry) -> str:
     """Return who did what, and why: the parameters of a write, the reason of a stop."""
     after, what, who = entry.get("after"), str(entry.get("what")), entry.get("who")
-    about = ", ".join(map(str, after)) if isinstance(after, Mapping) else ""
+    before = entry.get("before")
+    was = before if isinstance(before, Mapping) else {}
+    about = (
+        ", ".join(_changed(name, was.get(name), after[name]) for name in after)
+        if isinstance(after, Mapping)
+        else ""
+    )
     why = "" if about else str(entry.get("reason") or "")
-    why = "as somebody asked for" if why == ASKED_FOR else why
-    by = "" if what == TAKEN_BACK or not who else f"by {who}"  # by itself, whoever has asked for it
+    if why == ASKED_FOR:
+        return f"{what} on request"
+    by = "" if what == TAKEN_BACK or not who else _by(str(who))  # by itself, whoever has asked for it
     return ": ".join(filter(None, (" ".join(filter(None, (what, about, by))), why)))
+
+
+def _changed(name: str, before: object, after: object) -> str:
+    """Return a parameter with its old and its new value, as far as these are numbers or words."""
+    told = [f"{value:g}" if isinstance(value, float) else str(value) for value in (before, after)]
+    return str(name) if before is None else f"{name} {told[0]} → {told[1]}"
+
+
+def _by(who: str) -> str:
+    """Return who did it; a window's port tells people nothing."""
+    window = WINDOW.fullmatch(who)
+    if window is None:
+        return f"by {who}"
+    return "from the window" if window[1] in HERE else f"from the window on {window[1]}"
 
 
 def code_of(channel: str) -> str:

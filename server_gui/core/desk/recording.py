@@ -1,9 +1,11 @@
 """What is recorded of the robots, by whom, and how that goes, in words for the window."""
 
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
+from datetime import datetime
 from enum import Enum
 from typing import Final, Protocol
 
@@ -26,9 +28,17 @@ WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
 NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
 NOTHING: Final = "nothing comes"
+LATE_WHY: Final = "this computer is busy"
+LATE: Final = f"recording is late: {LATE_WHY}"  # for a moment; all words for it begin alike
+CHECK_LATE: Final = "end other programs on this computer"
 NO_ROBOT: Final = "No robot to record"
 COMES_S: Final = 3.0  # since the newest row: then nothing comes any more
 DAMAGED: Final = "gwrms cloud verify says what is missing, gwrms cloud mend brings it again"
+NO_FOLDER: Final = "No such file or directory"  # as the system says it
+CREATE: Final = "create the folder, or check its mount; what comes until then may be lost"
+NOT_REACHED: Final = "store not reached"
+AGAIN_SO: Final = r"\1 can be \2 again"
+AS_BEFORE: Final = re.compile(r"(.*) cannot be (\w+)\b.*", re.DOTALL)
 UNKNOWN_NS: Final = 2_000_000_000  # without an answer: nobody knows then
 
 
@@ -85,6 +95,7 @@ class Said:
     text: str
     detail: str = ""
     brief: str = "NOT REC"
+    reason: str = ""  # of a warning, in a few words
 
 
 class Recording:
@@ -114,6 +125,8 @@ class Recording:
         self._asking = False
         self._alone_since_ns: int | None = None  # when whoever records elsewhere did not answer any more
         self._trouble: dict[str, str] = {}  # kind → what was told of it
+        self._since_s: dict[str, float] = {}  # what was told, from when on, on our monotonic clock
+        self._stopped = ""  # since when nothing is recorded, and how much is kept
         self._threads: dict[By, tuple[Trouble, ...]] = {}  # by whose they are
 
     def rely_on(self, reach: StoreReach) -> None:
@@ -143,13 +156,13 @@ class Recording:
 
     def see(self, threads: Sequence[Trouble], by: By = By.WINDOW) -> None:
         """Show problems of the threads that follow, record and predict: this window's, or another's."""
-        told = {trouble.thread: trouble.text for trouble in self._threads.get(by, ())}
-        now = {trouble.thread: trouble.text for trouble in threads}
+        told = {trouble.thread: _told_as(trouble) for trouble in self._threads.get(by, ())}
+        now = {trouble.thread: _told_as(trouble) for trouble in threads}
         for thread, text in now.items():
             if told.get(thread) != text:
-                self._news.add(NewsKind.WARNING, WHO, text)
+                self._begun(text)
         for thread in told.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"no longer: {told[thread]}")
+            self._over(told[thread])
         self._threads[by] = tuple(threads)
 
     @property
@@ -183,7 +196,15 @@ class Recording:
     def pause(self) -> None:
         """End what is recorded now, of every robot."""
         if self._pausing is not None:
+            self._stopped = self._kept()
             self._change(self._pausing.pause(), "stopped: what comes now is not kept")
+
+    def _kept(self) -> str:
+        now_s, links = time.time(), () if self.report is None else self.report.robots.values()
+        begun = [link.recording_since_utc_s for link in links if link.recording_since_utc_s is not None]
+        minutes, seconds = divmod(round(now_s - min(begun)) if begun else 0, 60)
+        length = f" · {minutes}:{seconds:02} kept" if begun else ""
+        return f"since {datetime.fromtimestamp(now_s).astimezone():%H:%M:%S}{length}"
 
     @property
     def wearer(self) -> str:
@@ -248,7 +269,11 @@ class Recording:
     def _found(self) -> Iterator[Alarm]:
         said, report = self.said(None), self.report
         if said.tone is Tone.BAD:
-            yield Alarm(Kind.NOT_RECORDED, "", said.detail or said.text, check=check_of(Kind.NOT_RECORDED))
+            what = said.detail or said.text
+            check = CREATE if NO_FOLDER in what else check_of(Kind.NOT_RECORDED)
+            yield Alarm(Kind.NOT_RECORDED, "", what, check=check)
+        if said.detail == LATE:
+            yield Alarm(Kind.RECORDING, "late", LATE_WHY, "recorder", check=CHECK_LATE)
         if self.reach.trouble is not None:
             yield Alarm(Kind.UPLOAD, "", self.reach.trouble, check=check_of(Kind.UPLOAD))
         if report is None:
@@ -269,9 +294,11 @@ class Recording:
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why, "REC off")
         threads = self._threads.get(self.by, ())
-        ended = [known.text for known in threads if known.thread in NEEDED and not known.works]
+        ended = [known for known in threads if known.thread in NEEDED and not known.works]
+        if ended and all(known.is_late for known in ended):
+            return Said(Tone.WARNING, LATE.partition(":")[0].capitalize(), LATE, "REC late")
         if ended:
-            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(ended))
+            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(known.text for known in ended))
         if self.problem is not None:
             return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
         if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
@@ -285,7 +312,10 @@ class Recording:
             return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(stopped))
         if report.is_paused:
             return Said(
-                Tone.OFF, "Not recording: stopped", "somebody has stopped it in this window", "REC off"
+                Tone.OFF,
+                " · ".join(filter(None, ("Not recording: stopped", self._stopped))),
+                "somebody has stopped it in this window",
+                "REC off",
             )
         addresses = {link.address for link in report.robots.values()}
         if self.by is By.OTHER and address is not None and address not in addresses:
@@ -315,7 +345,21 @@ class Recording:
             " · ".join(facts),
             "\n".join(filter(None, detail)),
             "REC",
+            self._reason(report),
         )
+
+    def _reason(self, report: CollectorReport) -> str:
+        """Return why it is a warning, in a few words; "" where what is said of the rows tells that."""
+        reach, recorder = self.reach, report.recorder
+        known = (
+            (bool(recorder.alarms), "the spool has trouble"),
+            (reach.problem is not None, NOT_REACHED),
+            (reach.list_problem is not None, "store's list damaged"),
+            (reach.upload_problem is not None, "an upload failed"),
+            (bool(report.uploader.lost or report.uploader.ahead), "the spool has losses"),
+            (any(self._threads.values()), "a thread has trouble"),
+        )
+        return next((text for is_so, text in known if is_so), "")
 
     def _reported(self, keeper: Keeper, report: CollectorReport) -> None:
         if keeper is not self._keeper:
@@ -329,10 +373,20 @@ class Recording:
         now |= {} if self.reach.trouble is None else {"store": self.reach.trouble}
         now |= {text: text for text in (*report.uploader.lost, *report.uploader.ahead)}
         for kind in now.keys() - self._trouble.keys():
-            self._news.add(NewsKind.WARNING, WHO, now[kind])
+            self._begun(now[kind])
         for kind in self._trouble.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"no longer: {self._trouble[kind]}")
+            self._over(self._trouble[kind])
         self._trouble = now
+
+    def _begun(self, text: str) -> None:
+        self._since_s[text] = time.monotonic()
+        self._news.add(NewsKind.WARNING, WHO, text)
+
+    def _over(self, text: str) -> None:
+        """Tell that a trouble is over, and how it is again."""
+        since_s = self._since_s.pop(text, None)
+        after = "" if since_s is None else f" after {max(1.0, time.monotonic() - since_s):.0f} s"
+        self._news.add(NewsKind.STATE, WHO, f"over{after}: {AS_BEFORE.sub(AGAIN_SO, text)}")
 
     def _failed(self, keeper: Keeper, error: Exception) -> None:
         if keeper is not self._keeper:
@@ -369,11 +423,16 @@ class Recording:
         self._news.add(kind, WHO, text)
 
 
+def _told_as(trouble: Trouble) -> str:
+    """Return a thread's trouble as the window says it everywhere."""
+    return LATE if trouble.is_late and trouble.thread in NEEDED else trouble.text
+
+
 def _queue(report: CollectorReport, *, is_reached: bool) -> list[str]:
     uploader = report.uploader
     spool = f"spool {size(uploader.backlog_bytes)}"
     if not is_reached:
-        return [spool, f"store not reached, {uploader.waiting} to upload"]
+        return [spool, f"{NOT_REACHED}, {uploader.waiting} to upload"]
     return [spool, f"{uploader.waiting} to upload" if uploader.waiting else "all uploaded"]
 
 

@@ -1,9 +1,13 @@
 """What a reset, or a clearing of faults, came to, in words: what is still in fault is no success."""
 
 from collections.abc import Mapping
+from typing import Final
 
 from gateway.client import CallTimeout, LinkLost
 from gateway.wire.stop import Reset
+from server_gui.core.alarms.marks import Mark
+
+RESET_MARK: Final = Mark("ring", "dim", "RESET")  # neither good nor bad: nothing is enabled by it
 
 
 def after_reset(reset: Reset, next_step: str) -> tuple[str, str]:

@@ -26,7 +26,7 @@ from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
-from server_gui.core.desk.flag_watch import FlagWatch
+from server_gui.core.desk.flag_watch import FlagWatch, of_stop
 from server_gui.core.desk.flags import Flag, FlagKind, Flags
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
@@ -333,6 +333,7 @@ class Station:
 
     def _tell_stop(self) -> None:
         self.tell(NewsKind.NOT_STOPPED if self.stopping.is_unproven else NewsKind.STOP, self.stopping.news)
+        self.flags.add(*of_stop(self.stopping, self.rings.newest_ns, self.robot.age_s()))
 
     def _show_stop(self, event: Telemetry) -> None:
         """Update a running STOP from the drives' states."""
@@ -357,7 +358,7 @@ class Station:
                 return
             self.stopping.was_reset(reset.held)
             said, stays = after_reset(reset, go_on(Kind.RESET, self.robot))
-            self.tell(NewsKind.STOP, said)
+            self.tell(NewsKind.STOP if reset.held or stays else NewsKind.RESET, said)
             if stays:
                 self.tell(NewsKind.FAULT, stays)
                 failed(stays)

@@ -6,8 +6,8 @@ from typing import Final, Protocol
 
 from gateway.amounts import counted
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.robot_alarms import remedy
-from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.texts import TEXTS
+from server_gui.core.alarms.unconfirmed import remedy, silent_controllers, unconfirmed
 from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import StopProgress, StopState
 
@@ -60,7 +60,8 @@ def _result(robots: Sequence[Stopped], left: Sequence[Stopped]) -> StopAllResult
     parts = [f"{count}, {drives}" if drives else count]
     parts += [f"{_named(back)} reset"] if back else []
     parts += [f"no answer yet from {_named(waiting)}"] if waiting else []
-    brief = [f"{_named(missing)} {TEXTS[Kind.NOT_STOPPED].mark.word}"] if missing else []
+    words = dict.fromkeys(_word(one) for one in missing)
+    brief = [f"{_named([one for one in missing if _word(one) == word])} {word}" for word in words]
     why = [_why(one) for one in missing]
     mark = SENT if waiting else STOPPED
     mark = Mark("square", "bad", mark.word) if missing else mark
@@ -69,7 +70,10 @@ def _result(robots: Sequence[Stopped], left: Sequence[Stopped]) -> StopAllResult
 
 
 def _drives(robots: Sequence[Stopped], left: Sequence[Stopped]) -> str:
-    """Return `12/12 drives confirmed in 84 ms`: of the robots whose drives are known."""
+    """Return `12/12 drives confirmed in 84 ms`: of the robots whose drives are known.
+
+    Drives that were off before are counted apart: the time says nothing of them.
+    """
     if not any(one.stopping.state in (StopState.CONFIRMED, StopState.NOT_CONFIRMED) for one in left):
         return ""
     confirmed = sum(len(one.stopping.confirmed) for one in left)
@@ -80,13 +84,21 @@ def _drives(robots: Sequence[Stopped], left: Sequence[Stopped]) -> str:
     said = f"{confirmed}{every} {'drive' if one_drive else 'drives'} confirmed"
     if not confirmed:
         return said if every else ""
+    off = sum(len(one.stopping.already_off) for one in left)
+    if off and after_ms:
+        were = "was" if off == 1 else "were"
+        return f"{said}: {confirmed - off} stopped in {max(after_ms):.0f} ms, {off} {were} off before"
     return f"{said} in {max(after_ms):.0f} ms" if after_ms else f"{said}, already off"
 
 
 def _why(one: Stopped) -> str:
     """Return whose STOP is not confirmed, why, and what to do."""
-    word = TEXTS[Kind.NOT_STOPPED].mark.word
-    return f"{one.title} {word}: {one.stopping.why} → {', '.join(remedy(one.robot))}"
+    why = silent_controllers(one.robot, one.stopping) or one.stopping.why
+    return f"{one.title} {_word(one)}: {why} → {', '.join(remedy(one.robot, one.stopping))}"
+
+
+def _word(one: Stopped) -> str:
+    return TEXTS[unconfirmed(one.robot)].mark.word
 
 
 def _named(robots: Sequence[Stopped]) -> str:

@@ -11,7 +11,7 @@ from typing import Final
 from gateway.client import NotConnected, RemoteError
 from gateway.wire.parameter import Reverted, Written
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.experiment import Period
 from server_gui.core.evidence.robot_evidence import RobotEvidence
@@ -39,7 +39,7 @@ LIMITS_S: Final = {
     ExperimentState.TAKING_BACK: 35.0,
     ExperimentState.READING: 60.0,
 }
-IN_THE_WAY: Final = frozenset({Kind.GUARD, Kind.STOPPED, Kind.NOT_STOPPED})
+IN_THE_WAY: Final = UNSTOPPED | {Kind.GUARD, Kind.STOPPED}
 
 
 def begun(

@@ -14,7 +14,7 @@ from gateway.wire.framing import PROTOCOL
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.resource import KernelFacts
 from gateway.wire.robot import Description
-from server_gui.core.recording.records import NOBODY, Facts, Worn
+from server_gui.core.recording.records import NOBODY, RECORDER, Facts, Worn
 
 ENABLED: Final = "operation enabled"  # the word of a drive's state in which it follows its target
 NO_FILE: Final = "no file"
@@ -44,7 +44,7 @@ def facts(description: Description, operator: str, notes: str, worn: Worn = NOBO
 
 def versions(description: Description) -> dict[str, str]:
     """Return the versions of the software that takes part, as far as they are known."""
-    known = {"gwrms collect": importlib.metadata.version("gwrms"), "protocol": str(PROTOCOL)}
+    known = {RECORDER: importlib.metadata.version("gwrms"), "protocol": str(PROTOCOL)}
     return known if description.version is None else known | {"gateway": description.version}
 
 

@@ -51,7 +51,7 @@ def told_words(node: NodeInfo) -> tuple[str, str]:
     """Return what is told of it, and what to check where that is known."""
     words = f"{told_percent(node):.0f} % of its PDOs are missing"
     if isinstance(node, WatchedNode) and node.is_computer_busy:
-        return f"{words}; the robot's computer is busy", CHECK
+        return f"{words}; the robot's computer is overloaded", CHECK
     return words, ""
 
 

@@ -26,12 +26,13 @@ class NewsKind(Enum):
     PARAMETER = "PARAM"
     STOP = "STOP"
     NOT_STOPPED = "NOT STOPPED"
+    RESET = "RESET"
     CONTROL = "CONTROL"
 
 
 GRAVE: Final = frozenset({NewsKind.FAULT, NewsKind.STOP, NewsKind.NOT_STOPPED})
 DONE: Final = frozenset(
-    {NewsKind.PARAMETER, NewsKind.STOP, NewsKind.NOT_STOPPED, NewsKind.CONTROL}
+    {NewsKind.PARAMETER, NewsKind.STOP, NewsKind.NOT_STOPPED, NewsKind.RESET, NewsKind.CONTROL}
 )  # by people
 
 

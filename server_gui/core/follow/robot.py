@@ -85,6 +85,7 @@ class Robot:
     buses_at_ns: int | None = None
     last_failure: Failed | None = None
     asked_hz: float = 0.0  # rows a second; 0: as they come
+    start_by: str = ""  # what starts its controller, where that is known: of our simulator
     is_recording: bool = False  # then there is nobody whose state could be good
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(

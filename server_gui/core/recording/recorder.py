@@ -435,7 +435,7 @@ class Recorder:
             try:
                 self._roomy, uncleared = self._spool.make_room(), None
             except SpoolUnusable as error:  # a commit that finds none says so itself
-                self._roomy, uncleared = True, f"{error}; recording goes on as long as there is room"
+                self._roomy, uncleared = True, f"{error}; what was uploaded stays in it"
             full = f"recording has stopped: the disk of {self._spool.folder} is nearly full; make room there"
             self._alarm(AlarmKind.UNCLEARED, uncleared)
             self._alarm(AlarmKind.DISK_FULL, None if self._roomy else full)

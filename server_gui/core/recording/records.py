@@ -13,6 +13,7 @@ from gateway.wire.resource import ResourceSnapshot
 from ml.store.labels import Label
 from server_gui.core.recording.rows import Record
 
+RECORDER: Final = "gwrms collect"  # among the versions of a session: whose rows these are
 MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a snapshot, in one column
 
 

@@ -17,16 +17,21 @@ log = logging.getLogger(__name__)
 
 BEAT_S: Final = 0.25  # within which a thread that has nothing to do says so
 STILL_S: Final = 0.75  # without a word it stands still, where its work is never as long
+LATE_S: Final = 5.0  # beyond that it is late; then it hangs
 AGAIN_S: Final = 1.0  # between beginnings of a thread that dies again and again
 HELD_S: Final = 60.0  # that a death stays an alarm after the thread was begun anew, so that it is seen
 
 
 class Trouble(Struct, frozen=True):
-    """Trouble of a thread; `works` is whether its task continues all the same."""
+    """Trouble of a thread; `works` is whether its task continues all the same.
+
+    One that `is_late` has stood still for a moment only, as on a computer that is busy.
+    """
 
     thread: str
     text: str
     works: bool
+    is_late: bool = False
 
 
 class Worker:
@@ -93,9 +98,10 @@ class Worker:
                 text = f"the part “{self.name}” stopped unexpectedly, and stops again {self._why}"
                 return Trouble(self.name, text, works=False)
             self.start()
-        if now_s - self._beat_s > self._still_s:
+        if (still_s := now_s - self._beat_s) > self._still_s:
             still = f"the part “{self.name}” has not moved for more than {self._still_s:g} s"
-            return Trouble(self.name, f"{still}; is this computer too busy?", works=False)
+            late = still_s < self._still_s + LATE_S
+            return Trouble(self.name, f"{still}; is this computer too busy?", works=False, is_late=late)
         if self._deaths and now_s - self._died_s < HELD_S:
             text = f"the part “{self.name}” stopped unexpectedly and was restarted {self._why}"
             return Trouble(self.name, text, works=True)

@@ -95,6 +95,7 @@ class StopProgress:
     answered_ms: float | None = None
     number: int = 0
     drives: int = 0  # that have confirmed it
+    silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
@@ -135,7 +136,7 @@ class StopProgress:
             self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
             self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, off, clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
-        self._confirmed, self.was_ended, self._is_written = (), False, False
+        self.silent, self._confirmed, self.was_ended, self._is_written = (), (), False, False
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
@@ -149,6 +150,8 @@ class StopProgress:
         self.proofs = {drive: self._earliest(drive, proof) for drive, proof in self.proofs.items()}
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
         missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
+        if stopped.drives and len(self._confirmed) == len(stopped.drives):
+            self.silent = tuple(name for name, said in stopped.controllers.items() if said != "confirmed")
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
@@ -295,6 +298,11 @@ class StopProgress:
         after_ms = [proof.after_ms for drive in asked if (proof := self.proofs.get(drive)) is not None]
         is_shown = len(after_ms) == len(asked)
         return max(1.0, *after_ms) if is_shown else self.answered_ms or 0.0
+
+    @property
+    def already_off(self) -> frozenset[str]:
+        """The drives that have confirmed the latest STOP, and were off when it was sent."""
+        return self.confirmed & frozenset(self._off)
 
     @property
     def confirmed(self) -> frozenset[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
@@ -18,14 +19,15 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.plain_text import plain
-from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.alarm import Active, Alarms
 from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.core.alarms.severity import event_mark
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import WHO
+from server_gui.core.desk.resetting import RESET_MARK
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
-from server_gui.views.alarms.words import gathered
+from server_gui.views.alarms.words import in_order
 from server_gui.views.marks import time_of_day
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import SentenceDelegate
@@ -37,7 +39,7 @@ ROBOT: Final = 2  # its column
 # What of them is shown; active alarms are whatever is chosen.
 CHOICES: Final[dict[str, frozenset[NewsKind]]] = {
     "Everything": frozenset(NewsKind),
-    "Faults and stops": frozenset({NewsKind.FAULT, NewsKind.STOP, NewsKind.NOT_STOPPED}),
+    "Faults and stops": frozenset({NewsKind.FAULT, NewsKind.STOP, NewsKind.NOT_STOPPED, NewsKind.RESET}),
     "Lost, stale, links": frozenset({NewsKind.LOST, NewsKind.STALE, NewsKind.LINK}),
     "Warnings": frozenset({NewsKind.WARNING}),
     "Writes and control": frozenset({NewsKind.PARAMETER, NewsKind.CONTROL}),
@@ -78,7 +80,12 @@ class NewsModel(QAbstractTableModel):
         """Take what is new."""
         alarms = (self._desk.recording.alarms, *(one.alarms for one in self._desk.stations))
         titles = {one.name: one.title for one in self._desk.stations}
-        revision = (self._desk.news.revision, *(one.revision for one in alarms), *titles.values())
+        revision = (
+            self._desk.news.revision,
+            self._desk.selected,
+            *(one.revision for one in alarms),
+            *titles.values(),
+        )
         if revision != self._revision:
             self._revision = revision
             self._titles |= titles
@@ -90,11 +97,10 @@ class NewsModel(QAbstractTableModel):
         self._take()
 
     def _take(self) -> None:
-        worst_first = sorted(gathered(self._desk), key=lambda told: told[1].alarm.rank)  # few are in sight
-        active = [_of_alarm(*told) for told in worst_first]
+        active = [_of_alarm(*told) for told in in_order(self._desk)]  # as above the pages
         alarms = {one.name: one.alarms for one in self._desk.stations}
         news = (
-            _of_item(item, self._title(item), event_mark(item, alarms.get(item.robot)))
+            _of_item(item, self._title(item), _mark(item, alarms.get(item.robot)))
             for item in self._desk.news.items
             if item.kind in self._kinds
         )
@@ -191,7 +197,7 @@ class EventsPanel(QWidget):
         self.table.activated.connect(self._activated)
         self.tools = QWidget()
         tools = QHBoxLayout(self.tools)
-        tools.setContentsMargins(4, 3, 4, 2)
+        tools.setContentsMargins(4, 1, 4, 1)
         tools.addWidget(self.words, 1)
         tools.addWidget(self.kinds)
         self._column = QVBoxLayout(self)
@@ -216,6 +222,20 @@ class EventsPanel(QWidget):
         """Take what is new."""
         self._news.refresh()
         self.table.setColumnHidden(ROBOT, self._news.only is not None)
+        self._hold_rows()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._hold_rows()
+
+    def _hold_rows(self) -> None:
+        """Show whole rows: one that is cut is not read."""
+        row, frame = self.table.verticalHeader().defaultSectionSize(), 2 * self.table.frameWidth()
+        own = self.tools.height() if self.tools.parentWidget() is self and self.tools.isVisible() else 0
+        room = self.height() - own - frame
+        left = room % row if room > 2 * row else 0  # of a row, below the last whole one
+        if self._column.contentsMargins().bottom() != left:
+            self._column.setContentsMargins(0, 0, 0, left)
 
     def hold_tools(self) -> None:
         """Have the filter above the events: where no title bar has it."""
@@ -235,6 +255,11 @@ class EventsPanel(QWidget):
     def _restyle(self) -> None:
         self.table.verticalHeader().setDefaultSectionSize(self._theme.px(19))
         self.table.setMinimumHeight(self._theme.px(40))
+        self._hold_rows()
+
+
+def _mark(item: Item, alarms: Alarms | None) -> Mark:
+    return RESET_MARK if item.kind is NewsKind.RESET else event_mark(item, alarms)
 
 
 def _of_alarm(station: Station | None, one: Active) -> EventRow:

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.texts import UNSTOPPED
 from server_gui.views.alarms.words import Key, Told, blames, details, headline, key_of, now_s
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
@@ -204,7 +204,7 @@ class AlarmButtons(QWidget):
         self.show_signal.setVisible(all_of_them and shows)
         is_of_load = alarm is not None and station is not None and blames(alarm)
         self.show_resources.setVisible(all_of_them and is_of_load)
-        unread = one is not None and not one.is_acknowledged and one.alarm.kind is not Kind.NOT_STOPPED
+        unread = one is not None and not one.is_acknowledged and one.alarm.kind not in UNSTOPPED
         is_past = station is not None and station.robot.is_recording  # nobody has to have read it
         self.acknowledge.setVisible(all_of_them and unread and not is_past)
 
@@ -297,6 +297,7 @@ def style(theme: Theme) -> str:
         f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "
         f"border-left: 4px solid {colours.warn}; border-radius: 4px; }}"
         f'QFrame#alarm[tone="bad"] {{ border-color: {colours.bad}; }}'
+        f'QFrame#alarm[tone="urgent"] {{ border-color: {colours.bad}; background: {theme.urgent.name()}; }}'
         f'QFrame#alarm[tone="good"] {{ border-left-color: {colours.border}; }}'
         f'QFrame#alarm[tone="dim"], QFrame#alarm[tone="old"] {{ border-left-color: {colours.dim}; }}'
         f"QFrame#alarm:focus {{ border-color: {colours.accent}; }}"

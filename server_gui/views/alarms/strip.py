@@ -8,7 +8,7 @@ from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import MORE
-from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
 from server_gui.views.alarms.words import (
@@ -17,9 +17,9 @@ from server_gui.views.alarms.words import (
     Told,
     details,
     fewer,
-    gathered,
     going_on,
     headline,
+    in_order,
     key_of,
     leading,
     now_s,
@@ -92,11 +92,11 @@ class AlarmStrip(ClickableFrame):
     @property
     def named(self) -> bool:
         """Whether it must be said whose an alarm is."""
-        return len(self._desk.stations) > 1
+        return self._desk.has_several
 
     def refresh(self) -> None:
         """Show what is wrong now."""
-        before, self.told = self.told, tuple(self._active())
+        before, self.told = self.told, tuple(in_order(self._desk))
         first = self.told[0] if self.told else None
         if before and first is not None and key_of(before[0]) != key_of(first):
             self._changed_s = time.monotonic()
@@ -148,25 +148,6 @@ class AlarmStrip(ClickableFrame):
         if self.told or self.list.isVisible():
             self.list.turn()
 
-    def _active(self) -> list[Told]:
-        """Of all robots and the recording: what is bad, then of the one that is looked at.
-
-        How to go on after a reset is what its user looks for next: only what is bad goes before.
-        """
-        selected = self._desk.selected
-        return sorted(
-            gathered(self._desk),
-            key=lambda told: (
-                told[1].is_acknowledged,
-                told[1].alarm.kind is not Kind.NOT_STOPPED,
-                told[1].alarm.mark.colour != "bad",
-                told[0] is not None and told[0] is not selected,
-                told[1].alarm.kind is not Kind.RESET,
-                told[1].alarm.rank,
-                told[1].since_s,
-            ),
-        )
-
     def _say_again(self) -> None:
         self._say(self.told[0] if self.told else None)
 
@@ -181,7 +162,7 @@ class AlarmStrip(ClickableFrame):
             wordings = self._wordings(first) if lead is first else self._after_reset(first, lead)
             fuller = fewer(details(first[1], now_s(first[0])))
         self._icon.show_mark(mark)
-        set_tone(self, mark.colour)
+        set_tone(self, "urgent" if first is not None and first[1].alarm.kind in UNSTOPPED else mark.colour)
         self.setAccessibleDescription("; ".join(filter(None, (wordings[0], fuller[0]))))
         set_tip(self, "\n".join(filter(None, (wordings[0], fuller[0]))) if first is not None else "")
         said_now = (wordings, fuller, self._words.room, self.headline.font().key())
@@ -193,7 +174,7 @@ class AlarmStrip(ClickableFrame):
         """Return its line for less and less room; nothing is cut of why a stop is not confirmed."""
         said = tuple(headline(told, named=self.named, brief=brief) for brief in range(4))
         alarm = told[1].alarm
-        return said[: 2 if alarm.aside else 1] if alarm.kind is Kind.NOT_STOPPED else said
+        return said[: 2 if alarm.aside else 1] if alarm.kind in UNSTOPPED else said
 
     def _after_reset(self, told: Told, worse: Told) -> tuple[str, ...]:
         return going_on(told, worse[1].alarm, named=self.named)

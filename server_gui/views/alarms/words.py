@@ -8,7 +8,7 @@ from typing import Final
 from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.overload import ALSO
-from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
@@ -19,7 +19,7 @@ Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
 BREAK: Final = re.compile("[;,] ")  # between things to check
 SINCE: Final = "since "
-UNSEEN: Final = "as far as it is replayed: buses and computers are not"
+UNSEEN: Final = "of its signals; trouble of its buses is on the time axis"
 BLAME: Final = re.compile(r"gwrms blame(?:, gwrms snapshot resource)?")
 BLAME_PAGE: Final = "on the page Resources"
 REMEDY: Final = "→"  # what there is to check, or to do
@@ -34,6 +34,26 @@ def gathered(desk: Desk) -> list[Told]:
     """Return every alarm: of the recording, then of each robot."""
     found: list[Told] = [(None, one) for one in desk.recording.alarms.active]
     return found + [(station, one) for station in desk.stations for one in station.alarms.active]
+
+
+def in_order(desk: Desk) -> list[Told]:
+    """Return every alarm: what is bad, then of the robot that is looked at, the worst first.
+
+    How to go on after a reset is what its user looks for next: only what is bad goes before.
+    """
+    selected = desk.selected
+    return sorted(
+        gathered(desk),
+        key=lambda told: (
+            told[1].is_acknowledged,
+            told[1].alarm.kind not in UNSTOPPED,
+            told[1].alarm.mark.colour != "bad",
+            told[0] is not None and told[0] is not selected,
+            told[1].alarm.kind is not Kind.RESET,
+            told[1].alarm.rank,
+            told[1].since_s,
+        ),
+    )
 
 
 def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:
@@ -100,10 +120,15 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
     alarm = one.alarm
     first = f"{SINCE}{time_of_day(one.since_s)}, for {lasting(max(0.0, now_s - one.since_s))}"
+    first = f"{first} · {alarm.why}" if alarm.why else first
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
-    return [*lines, f"{REMEDY} {in_window(alarm.check)}"] if alarm.check else lines
+    return (
+        [*lines, f"{REMEDY} {in_window(alarm.check)}"]
+        if alarm.check and alarm.check not in alarm.what
+        else lines
+    )
 
 
 def blames(alarm: Alarm) -> bool:
@@ -120,7 +145,7 @@ def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts for less and less room: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
     bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
-    first = [f"{begins}{MORE}" for one in check if (begins := BREAK.split(one, maxsplit=1)[0]) != one]
+    first = [f"{begun}{MORE}" for one in check for begun in _begun(one)]
     with_check = (
         said,
         [since, *said[1:]],
@@ -128,10 +153,17 @@ def fewer(said: list[str]) -> tuple[str, ...]:
         [since, *bare],
         check,
         bare,
-        [since, *first] if first else [],
+        *([since, one] for one in first),
     )
-    shorter: tuple[list[str], ...] = (*with_check, first, [since], [])
+    shorter: tuple[list[str], ...] = (*with_check, *([one] for one in first), [since], [])
     return tuple(dict.fromkeys(map(" · ".join, shorter)))
+
+
+def _begun(check: str) -> list[str]:
+    """Return what begins it, a word less each, down to its first clause: no room stays empty."""
+    least, words = BREAK.split(check, maxsplit=1)[0], check.split(" ")
+    begun = (" ".join(words[:count]).rstrip(",;") for count in range(len(words) - 1, 0, -1))
+    return [one for one in dict.fromkeys(begun) if len(one) >= len(least)]
 
 
 def lasting(for_s: float) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHeaderView, QSizePolicy, QTreeWidget, QTreeWidgetItem
 
 from gateway.amounts import size
@@ -13,6 +14,8 @@ from server_gui.core.cloud.usage import Usage
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.views.theme import Theme
 
+WIDE: Final = 600  # at text of 100 %: times have seconds
+FINE, COARSE = "%Y-%m-%d %H:%M:%S", "%Y-%m-%d %H:%M"
 TITLES: Final = ("Table, robot, file", "Files", "Rows", "Size", "From", "To")
 FOLDER_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 MOST_FILES: Final = 500  # that are listed below one
@@ -27,6 +30,7 @@ class Browser(QTreeWidget):
         self._library = library
         self._deliver = deliver
         self._theme = theme
+        self._times = COARSE
         self._revision = -1
         self.setHeaderLabels(TITLES)
         self.setAccessibleName("What is in the store")
@@ -49,13 +53,33 @@ class Browser(QTreeWidget):
         for each in self._library.found.usage:
             tables.setdefault(each.table, []).append(each)
         for table, parts in tables.items():
-            top = QTreeWidgetItem(self, _cells(table, parts))
+            top = QTreeWidgetItem(self, self._cells(table, parts))
             _numbers(top)
             for part in parts if parts[0].robot is not None else ():
-                self._folder(QTreeWidgetItem(top, _cells(str(part.robot), [part])), f"{table}/", part.robot)
+                below = QTreeWidgetItem(top, self._cells(str(part.robot), [part]))
+                self._folder(below, f"{table}/", part.robot)
             if parts[0].robot is None:
                 self._folder(top, f"{table}/", None)
             top.setExpanded(table in opened and parts[0].robot is not None)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show seconds, too, where there is room for them."""
+        super().resizeEvent(event)
+        times = FINE if self.width() >= self._theme.px(WIDE) else COARSE
+        if times != self._times:
+            self._times, self._revision = times, -1  # shown so with the next frame
+
+    def _cells(self, name: str, parts: Sequence[Usage]) -> list[str]:
+        begins = [part.first for part in parts if part.first is not None]
+        ends = [part.last for part in parts if part.last is not None]
+        return [
+            name,
+            f"{sum(part.files for part in parts):,}",
+            f"{sum(part.rows for part in parts):,}",
+            size(sum(part.size_bytes for part in parts)),
+            f"{min(begins).astimezone():{self._times}}" if begins else "–",
+            f"{max(ends).astimezone():{self._times}}" if ends else "–",
+        ]
 
     def _restyle(self) -> None:
         self.setMinimumHeight(self._theme.px(110))
@@ -93,7 +117,7 @@ class Browser(QTreeWidget):
             return  # the item has gone
         item.takeChildren()
         for each in mine[:MOST_FILES]:
-            written = f"{each.changed.astimezone():%Y-%m-%d %H:%M}"
+            written = f"{each.changed.astimezone():{self._times}}"
             _numbers(QTreeWidgetItem(item, [each.path, "", "", size(each.size_bytes), written, ""]))
         if len(mine) > MOST_FILES:
             QTreeWidgetItem(item, [f"… {len(mine) - MOST_FILES} more (gwrms cloud ls --path {item.text(0)})"])
@@ -102,19 +126,6 @@ class Browser(QTreeWidget):
         if revision == self._revision:
             item.takeChildren()
             QTreeWidgetItem(item, [text])
-
-
-def _cells(name: str, parts: Sequence[Usage]) -> list[str]:
-    begins = [part.first for part in parts if part.first is not None]
-    ends = [part.last for part in parts if part.last is not None]
-    return [
-        name,
-        f"{sum(part.files for part in parts):,}",
-        f"{sum(part.rows for part in parts):,}",
-        size(sum(part.size_bytes for part in parts)),
-        f"{min(begins).astimezone():%Y-%m-%d %H:%M}" if begins else "–",
-        f"{max(ends).astimezone():%Y-%m-%d %H:%M}" if ends else "–",
-    ]
 
 
 def _numbers(item: QTreeWidgetItem) -> None:

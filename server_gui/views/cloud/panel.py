@@ -43,6 +43,7 @@ UPLOAD_NOW: Final = "Upload now"
 UPLOAD_HINT: Final = "Everything recorded so far, without waiting for a full batch"
 TRY: Final = "Try again now"
 TRY_HINT: Final = "Look for the store at once, and upload what waits if it is there"
+LOOK_HINT: Final = "Read again what the store holds; nothing is uploaded"
 UPLOAD: Final = "Upload what waits"
 NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
@@ -142,10 +143,12 @@ class Cloud(QWidget):
     def _store(self) -> QGridLayout:
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
-        row = QHBoxLayout()
-        row.addWidget(self._icon)
-        row.addWidget(self.state, 1)
+        row, said = QHBoxLayout(), QHBoxLayout()
+        said.addWidget(self._icon)
+        said.addWidget(self.state, 1)
+        row.addStretch(1)
         again = QPushButton("Look again")
+        set_tip(again, LOOK_HINT)
         again.clicked.connect(lambda: self._archive.library.look(now=True))
         row.addWidget(again)
         self.edit = QPushButton("Settings")
@@ -155,7 +158,8 @@ class Cloud(QWidget):
         self.edit.toggled.connect(self.settings.setVisible)
         row.addWidget(self.edit)
         grid.addLayout(row, 0, 0, 1, 2)
-        for place, (name, value) in enumerate(self._facts.items(), 1):
+        grid.addLayout(said, 1, 0, 1, 2)  # all of the width: a reason is long
+        for place, (name, value) in enumerate(self._facts.items(), 2):
             title = PlainLabel(name)
             title.setObjectName("dim")
             grid.addWidget(title, place, 0)
@@ -222,9 +226,9 @@ class Cloud(QWidget):
             return
         self.spool.say("spool", str(report.spool))
         uploader = report.uploader
+        kept = f"{size(uploader.backlog_bytes)} on this computer"
         lines = [
-            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} including what is being recorded",
-            f"{uploader.uploaded} uploaded since recording began",
+            " · ".join((_waiting(uploader.waiting), kept, _uploaded(uploader.uploaded))),
             f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]
         if uploader.problem is not None:
@@ -261,7 +265,11 @@ class Cloud(QWidget):
 
 
 def _waiting(batches: int) -> str:
-    return "1 batch waits" if batches == 1 else f"{batches or 'no'} batches wait"
+    return "1 batch waits" if batches == 1 else f"{batches} batches wait" if batches else "nothing waits"
+
+
+def _uploaded(batches: int) -> str:
+    return "1 batch uploaded" if batches == 1 else f"{batches} batches uploaded"
 
 
 def _value() -> QLabel:

@@ -1,15 +1,15 @@
 """State of commissioning in words, with STOP beside it: always visible on the page."""
 
-from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSpacerItem, QVBoxLayout, QWidget
 
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.stages import GO_ON
+from server_gui.core.commissioning.messages import DRIVES_ONLY
+from server_gui.core.commissioning.stages import GO_ON, Stage
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -17,6 +17,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 GO_ON_SOON: Final = "What was found is kept: “Go on” takes it up again once the command has ended."
 STOP_WIDE: Final = 150  # at text of 100 %
+APART: Final = 18  # likewise: from STOP to what leads on
 LONG_S: Final = 3.0  # work that takes longer says for how long
 STOP_TIP: Final = (
     "Ends what the command does, and asks every drive that it has found for a quick stop (F12 or Ctrl+Space "
@@ -51,8 +52,6 @@ class Bar(QWidget):
         set_tip(self.stop, STOP_TIP)
         self.stop.setAccessibleDescription(STOP_TIP)
         self.stop.stopped.connect(self.stopped)
-        theme.changed.connect(self._restyle)
-        self._restyle()
         everything = QVBoxLayout(self)
         everything.setContentsMargins(10, 6, 8, 6)
         row = QHBoxLayout()
@@ -60,9 +59,17 @@ class Bar(QWidget):
         row.addWidget(self.stage, 1)
         row.addWidget(start)
         row.addWidget(self.interrupt)
+        self._apart = QSpacerItem(0, 0)
+        row.addItem(self._apart)
         row.addWidget(self.stop)
         everything.addLayout(row)
+        self.drives_only = WrappingLabel()
+        self.drives_only.setText(f"▲ {DRIVES_ONLY}.")
+        self.drives_only.hide()
+        everything.addWidget(self.drives_only)
         everything.addWidget(self.words)
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     def refresh(self) -> None:
         """Show how it is now."""
@@ -73,17 +80,30 @@ class Bar(QWidget):
         set_text(self.words, self._said())
         self._start.setVisible(not now.runs)
         self.interrupt.setVisible(now.runs)
+        self._lead_on(is_first=now.stage is Stage.NOT_STARTED)
+        self.drives_only.setVisible(now.drives_only)
+        set_tone(self.drives_only, "warn")
         self.stop.setEnabled(now.can_stop)
-        self.stop.name(None if now.wish is None else Path(now.wish.file).stem)
+        self.stop.name(now.name or None)
         self.stop.setAccessibleName("STOP the drives that are commissioned")
+
+    def _lead_on(self, *, is_first: bool) -> None:
+        """Let nothing lead on as loudly as STOP stops, but at first."""
+        name = "primary" if is_first else ""
+        if self._start.objectName() != name:
+            self._start.setObjectName(name)
+            self._start.style().polish(self._start)
 
     def _restyle(self) -> None:
         self.stop.setFont(self._theme.text_font(1.2, bold=True))
         self.stop.setMinimumWidth(self._theme.px(STOP_WIDE))
+        self._apart.changeSize(self._theme.px(APART), 0)
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())  # what comes moves no button
 
     def _said(self) -> str:
         now = self._commissioning
+        if now.stage in (Stage.HAND, Stage.ASKING) and now.progress:
+            return "\n".join(filter(None, (now.progress, now.problem)))
         words = now.look_of.words if now.can_start else now.look_of.words.replace(GO_ON, GO_ON_SOON)
         if now.is_silent:
             words = f"No output for {now.working_s:.0f} s, longer than any step takes: press STOP."

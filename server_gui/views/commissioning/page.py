@@ -101,7 +101,7 @@ class CommissionPage(QWidget):
         self.question.setVisible(now.question is not None)
         self.question.refresh()
         self.steps.show_steps(now.steps, runs=now.runs)
-        self.stopped.show_proof(now.proof)
+        self.stopped.show_proof(now.proof, now.off)
         self.result.refresh()
         self.log.setVisible(now.logged > 0)
         self.log.refresh()

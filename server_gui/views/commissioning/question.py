@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit,
 
 from gateway.units import with_minus
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.messages import Message
+from server_gui.core.commissioning.messages import Message, mover
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
@@ -159,6 +159,7 @@ class Live(QWidget):
         self._theme = theme
         self.setAccessibleName("What the drives tell now")
         self._rows: list[tuple[PlainLabel, WrappingLabel]] = []
+        self._moved: list[bool] = []  # of each row, whether its drive has
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 4, 0, 0)
         self._grid.setColumnStretch(1, 1)
@@ -177,24 +178,39 @@ class Live(QWidget):
             told.setdefault(reading.name, []).append(reading.text)
         while len(self._rows) < len(told):
             self._add()
-        lines = list(told.items())
+        lines, moved = list(told.items()), mover(commissioning.live)
         for place, (name, value) in enumerate(self._rows):
             known = place < len(lines)
             name.setVisible(known)
             value.setVisible(known)
             if known:
                 set_text(name, lines[place][0])
-                set_text(value, " · ".join(lines[place][1]))
+                texts = lines[place][1]
+                has_moved = lines[place][0] == moved
+                set_text(value, " · ".join([*texts, "✓"] if has_moved else texts))
+                self._mark(place, has_moved=has_moved)
         self.setVisible(bool(lines))
 
     def _add(self) -> None:
         name, value = PlainLabel(), WrappingLabel()
+        self._moved.append(False)
         name.setObjectName("dim")
         self._grid.addWidget(name, len(self._rows), 0, Qt.AlignmentFlag.AlignTop)
         self._grid.addWidget(value, len(self._rows), 1)
         self._rows.append((name, value))
         self._restyle()
 
+    def _mark(self, place: int, *, has_moved: bool) -> None:
+        """Have the drive that has moved enough in bold."""
+        if self._moved[place] is not has_moved:
+            self._moved[place] = has_moved
+            self._restyle()
+
     def _restyle(self) -> None:
-        for _, value in self._rows:
-            value.setFont(self._theme.number_font(1.1))
+        for (name, value), is_bold in zip(self._rows, self._moved, strict=True):
+            name.setFont(
+                self._theme.text_font(1.1, bold=is_bold)
+            )  # as high as its value, on one line with it
+            font = self._theme.number_font(1.1)
+            font.setBold(is_bold)
+            value.setFont(font)

@@ -1,5 +1,6 @@
 """What each drive has said to a STOP while the robot is commissioned: a row a drive, with its time."""
 
+from collections.abc import Collection
 from typing import Final
 
 from PySide6.QtCore import Qt
@@ -9,7 +10,7 @@ from server_gui.core.commissioning.messages import StoppedMessage
 from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
-TITLES: Final = ("Drive", "State", "Confirmed after")
+TITLES: Final = ("Drive", "State", "Confirmed")
 
 
 class StoppedCard(Card):
@@ -17,7 +18,7 @@ class StoppedCard(Card):
 
     def __init__(self) -> None:
         super().__init__("STOP, drive by drive")
-        self._known: StoppedMessage | None = None
+        self._known: tuple[StoppedMessage | None, Collection[str]] = (None, ())
         self._rows: list[tuple[WrappingLabel, ...]] = []
         inner = QWidget()
         self._grid = QGridLayout(inner)
@@ -37,12 +38,12 @@ class StoppedCard(Card):
         """The shown rows."""
         return [tuple(cell.text() for cell in row) for row in self._rows if not row[0].isHidden()]
 
-    def show_proof(self, stopped: StoppedMessage | None) -> None:
-        """Show what the drives have said, or nothing."""
-        if stopped == self._known:
+    def show_proof(self, stopped: StoppedMessage | None, off: Collection[str] = ()) -> None:
+        """Show what the drives have said, of which some were `off` before, or nothing."""
+        if (stopped, off) == self._known:
             return
-        self._known = stopped
-        rows = () if stopped is None else stopped.rows
+        self._known = stopped, off
+        rows = () if stopped is None else stopped.rows(off)
         self.setVisible(bool(rows))
         while len(self._rows) < len(rows):
             self._add()

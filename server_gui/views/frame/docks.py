@@ -8,16 +8,19 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QT
 
 from server_gui.views.frame.dock_title import DockTitle, HasTools
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
 # with range and default.
 WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 492)), (0, (225, 400)))
 ROOMY: Final = 1200  # wide, at text of 100 %: what is narrower has no room for everything at once
-BELOW: Final = (120, 76)  # high, likewise: events, where the window is `HIGH` and where it is not
+BELOW: Final = (120, 86)  # high, likewise: events, where the window is `HIGH` and where it is not
 HIGH: Final = 820
 TIGHT: Final = 800  # wide, likewise: what is narrower begins without panels, which would hide the robot
 STACK: Final = 356  # wide, likewise: panels that are one behind the other
+BUTTONS: Final = 80  # wide, likewise: what stands beside a panel's title
+IN_TAB: Final = 100  # wide, likewise: the robot's name, where panels are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
 Area = Qt.DockWidgetArea
 
@@ -50,12 +53,14 @@ class Docks(QObject):
         self.all = [self._dock(title, widget, area) for title, (widget, area) in panels.items()]
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
+        self._is_held, self._held = False, list[QDockWidget]()
         self._size()
         self._usual = self._roomy = window.saveState(LAYOUT)
 
     @property
     def state(self) -> QByteArray:
         """State to be saved."""
+        self.hold_back(is_held=False)  # that is not what people have arranged
         return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
 
     def restore(self, state: QByteArray) -> None:
@@ -83,11 +88,37 @@ class Docks(QObject):
             dock.setVisible(not in_sight)
         self._put_away = in_sight
 
+    def hold_back(self, *, is_held: bool) -> bool:
+        """Hide them as long as there is nothing for them to show; return whether they are shown again."""
+        if is_held is self._is_held:
+            return False
+        self._is_held = is_held
+        if is_held:
+            self._held = self._in_sight
+        for dock in self._held:
+            dock.setVisible(not is_held)
+        if not is_held:
+            self._held = []
+            self._size()
+        return not is_held
+
     def bring(self, dock: QDockWidget) -> None:
         """Show this one, in front of those that are at its place, whose names stand beside its own."""
         for one in (*(self.all[:-1] if self.is_narrow else ()), dock):
             one.show()
         dock.raise_()
+
+    def say_whose(self, dock: QDockWidget, name: str) -> None:
+        """Name the robot in a panel's title, cut in its middle where it has no room; "" names none."""
+        title, metrics = dock.objectName(), dock.fontMetrics()
+        if name:
+            before = f"{title} – "
+            beside = metrics.horizontalAdvance(before) + self._theme.px(BUTTONS)
+            room = self._theme.px(IN_TAB) if self.is_narrow else dock.width() - beside
+            title = before + metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room)
+        if dock.windowTitle() != title:
+            dock.setWindowTitle(title)
+            dock.toggleViewAction().setText(dock.objectName())
 
     @property
     def has_room(self) -> bool:
@@ -96,14 +127,18 @@ class Docks(QObject):
 
     def fit(self, *, scaled: bool = False) -> None:
         """Arrange them for the room that there is; where text has another size, as wide as it needs."""
+        was_held = self._is_held
         if self.has_room is self.is_narrow:
+            self.hold_back(is_held=False)
             self.is_narrow = not self.has_room
             if self.is_narrow:
                 self._roomy = self._window.saveState(LAYOUT)
                 self._stack()
             else:
                 self._unstack()
-        self._fit_tight()
+            self.hold_back(is_held=was_held)
+        if not self._is_held:
+            self._fit_tight()
         if scaled or (self._usual_widths != self._widths and not self.is_narrow):
             self._size()
 
@@ -158,6 +193,12 @@ class Docks(QObject):
     def _usual_widths(self) -> tuple[int, int]:
         width = self._window.width()
         return next(widths for least, widths in WIDTHS if width >= self._theme.px(least))
+
+    def call(self, dock: QDockWidget, name: str) -> None:
+        """Call it so in its title bar, where it has one with its name."""
+        bar = dock.titleBarWidget()
+        if isinstance(bar, DockTitle):
+            set_text(bar.name, name)
 
     def _stack(self) -> None:
         """One behind the other; their tabs say what they are, so that they need no title."""

@@ -13,9 +13,11 @@ from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH = 560  # at text of 100 %: longer lines are not read
+ADDRESS = "192.168.100.200:7420"  # whole in its field
+AROUND = 24  # pixels around what is typed, at text of 100 %
 ADD = (
-    "Where its gateway listens, as gwrms gateway prints it. One that has keys shows a code to pair with: "
-    "sudo gwrms keys pair."
+    "Address that “gwrms gateway” prints. A robot that has keys shows a code to pair with: "
+    "“sudo gwrms keys pair”."
 )
 HINT = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
@@ -122,6 +124,8 @@ class EmptyView(QWidget):
 
     def _restyle(self) -> None:
         self.title.setFont(self._theme.text_font(1.8, bold=True))
+        widest = self.address.fontMetrics().horizontalAdvance(ADDRESS)
+        self.address.setMinimumWidth(widest + self._theme.px(AROUND))
         self._middle.setMaximumWidth(self._theme.px(WIDTH))
 
 

@@ -9,15 +9,15 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
-from server_gui.core.alarms.robot_alarms import remedy
-from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.texts import TEXTS
+from server_gui.core.alarms.unconfirmed import remedy, unconfirmed
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import ENABLED, StopState, is_off
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import SHORTER, Mark, age_text, drives_mark, enabled_text
-from server_gui.views.predictions import OLD, by_steps, status
+from server_gui.views.predictions import OLD, by_steps, is_last_held, no_data, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -25,7 +25,6 @@ from server_gui.views.widgets.stop_button import StopButton
 STOP_MARKS: Final = {
     StopState.SENT: Mark("half", "warn", "sent"),
     StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
-    StopState.NOT_CONFIRMED: TEXTS[Kind.NOT_STOPPED].mark,
 }
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
@@ -212,8 +211,11 @@ def _outcome(station: Station) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (stopping.timed(counted(stopping.drives, "drive")),),
-        StopState.NOT_CONFIRMED: remedy(station.robot),
+        StopState.NOT_CONFIRMED: remedy(station.robot, stopping),
     }
+    if stopping.is_unproven:
+        mark = TEXTS[unconfirmed(station.robot)].mark
+        return Words(mark, mark.word, parts[stopping.state], tip)
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
 
@@ -230,6 +232,8 @@ def _robot(station: Station) -> Words:
 
 def _drives(station: Station) -> Words:
     count = enabled_text(station.robot, live=station.is_live)  # whole: the rest makes it look better
+    if not station.is_live and is_last_held(station):
+        return Words(Mark("ring", "warn"), "Off when last seen", (no_data(station), count))
     if not station.is_live:
         return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)

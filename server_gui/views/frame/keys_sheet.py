@@ -13,9 +13,9 @@ WIDEST: Final = 560  # at text of 100 %
 # What a key is pressed for, by where it holds. A test compares the first three groups with the window's own.
 KEYS: Final[dict[str, dict[str, str]]] = {
     "Everywhere": {
-        "F12": "STOP the selected robot",
-        "Ctrl+Space": "STOP the selected robot",
-        "Shift+F12": "STOP ALL: every robot of the list",
+        "F12": "STOP the selected robot, and the one that is being commissioned",
+        "Ctrl+Space": "STOP the selected robot, and the one that is being commissioned",
+        "Shift+F12": "STOP ALL: every robot of the list, and the one that is being commissioned",
         "Ctrl+1": "Select the first robot; up to Ctrl+9",
         "Alt+O": "Overview; Alt with the underlined letter opens each tab",
         "Ctrl+F": "Filter the parameters",

@@ -51,17 +51,21 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.predictions import activity
 from server_gui.views.refresh_rate import RefreshRate
-from server_gui.views.robots.panel import RobotsPanel
+from server_gui.views.robots.panel import HINT_ALL, RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
+from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.visibility import has_focus_in, is_seen
 
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
+EVENTS: Final = 2  # among the docks
+EVENTS_LIVE: Final = "Events, live"  # beside a recording that is played
 ROBOTS: Final = 9  # that have a key
+ALL_WIDE: Final = 160  # STOP ALL beside the pages, at text of 100 %, at most
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
 
@@ -150,8 +154,9 @@ class MainWindow(QMainWindow):
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
+            desk.commissions = lambda: commissioning.wish is not None
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
-        self._bar = StatusBar(desk, theme)
+        self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
         self.page_bar = PageBar(self.tabs, self._help_corner())
         column.addWidget(self.experiment)
@@ -189,19 +194,32 @@ class MainWindow(QMainWindow):
         """All but the page."""
         self._pages.setCurrentIndex(1 if shown else 0)
         self.page_bar.setVisible(shown)
+        if self._panels.hold_back(is_held=not self._desk.stations):
+            self._fit()
         self.header.refresh()
         self.stopped_all.refresh()
         self.alarms.refresh()
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
+        self._panels.say_whose(self.docks[1], self._desk.whose)
         self.events.refresh()
+        self._panels.call(self.docks[EVENTS], EVENTS_LIVE if self.tabs.shows_playback else "Events")
+        self._offer_stop_all()
         self._bar.refresh()
         now = self.tabs.overview.now
         elsewhere = (self.parameters.trial, now.trial)
         now.offer(not is_seen(self.parameters.trial))
         self.experiment.refresh()
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
+
+    def _offer_stop_all(self) -> None:
+        """Have it in sight beside the pages where the panel with the robots is not."""
+        is_needed = len(self._desk.stations) > 1 and not is_seen(self.robots.all_stop)
+        self.stop_everyone.allow(self._theme.px(ALL_WIDE))
+        if self.stop_everyone.isHidden() is is_needed:
+            self.stop_everyone.setVisible(is_needed)
+            self.page_bar.arrange()  # now: else what is below moves a frame later
 
     def _is_due(self) -> bool:
         """Return whether occasional readings are due: at once if they are about something else.
@@ -372,10 +390,19 @@ class MainWindow(QMainWindow):
         self.panels_button.setToolTip("Hide robots, parameters and events, or show them again (F9)")
         self.panels_button.clicked.connect(lambda: self._panels.put_away())
         self.panels_button.hide()
+        self.stop_everyone = StopButton("robot_stop")
+        self.stop_everyone.name("ALL")
+        self.stop_everyone.setAccessibleName("STOP every robot")
+        self.stop_everyone.setAccessibleDescription(HINT_ALL)
+        self.stop_everyone.setToolTip(HINT_ALL)
+        self.stop_everyone.stopped.connect(self.stop_all)
+        self.stop_everyone.hide()
         corner = QWidget()
         row = QHBoxLayout(corner)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(2)
+        row.addWidget(self.stop_everyone)
+        row.addSpacing(12)
         row.addWidget(self.panels_button)
         row.addWidget(self.help_button)
         return corner

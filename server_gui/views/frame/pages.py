@@ -132,6 +132,12 @@ class Pages(QTabWidget):
         return cast("View", self._rooms[self.currentIndex()].view)
 
     @property
+    def shows_playback(self) -> bool:
+        """Whether a recording is played in front."""
+        room = self._rooms[self.currentIndex()]
+        return room.is_made and isinstance(room.view, Recordings) and room.view.is_played
+
+    @property
     def is_of_a_robot(self) -> bool:
         """Whether that in front shows the robot that is looked at."""
         return self.currentIndex() < OF_A_ROBOT

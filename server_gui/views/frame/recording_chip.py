@@ -55,11 +55,28 @@ def ask_recording(parent: QWidget, recording: Recording) -> None:
     if recording.is_paused:
         ask_name(parent, recording.go_on, recording.wearer)
         return
-    text = (
-        "Stop recording every robot of this window?\n\nRobots are shown as before, and their journals are "
+    ask(parent, "Stop recording", stop_question(recording), "Stop recording", recording.pause)
+
+
+def stop_question(recording: Recording) -> str:
+    """Return what is asked before it ends."""
+    return (
+        f"Stop {_named(recording)}?\n\nRobots are shown as before, and their journals are "
         "still kept; nothing else that they send is kept until you start recording again."
     )
-    ask(parent, "Stop recording", text, "Stop recording", recording.pause)
+
+
+def _named(recording: Recording) -> str:
+    """Return what would be stopped: each recording's name, how long it is by now, and of which robot."""
+    report, now_s = recording.report, time.time()
+    links = {} if report is None else {name: one for name, one in report.robots.items() if one.session}
+    told = []
+    for robot, link in links.items():
+        name = f"“{link.notes}”" if link.notes else "the recording"
+        since_s = link.recording_since_utc_s
+        length = "" if since_s is None else f", {clock_text(max(0.0, now_s - since_s))},"
+        told.append(f"{name}{length} of {robot}")
+    return " and ".join(told) or "recording every robot of this window"
 
 
 def ask_name(parent: QWidget, begin: Callable[[str, str], None], worn_by: str = "") -> None:
@@ -93,6 +110,6 @@ def _words(recording: Recording, said: Said, address: str | None) -> Words:
     if said.tone in (Tone.BAD, Tone.OFF) or since_s is None:
         return Words(mark, first, (rest,) if rest else (), tip, brief=(said.brief,))
     clock = clock_text(max(0.0, time.time() - since_s))
-    said_of = tuple(rest.split(" · "))
+    said_of = tuple(filter(None, (said.reason, *rest.split(" · "))))
     parts = (said_of[0], link.notes) if link is not None and link.notes else said_of
     return Words(mark, f"{first} {clock}", parts, tip, brief=(f"{said.brief} {clock}", *parts[:1]))

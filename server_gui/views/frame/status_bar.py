@@ -4,14 +4,16 @@ import collections
 import time
 from typing import Final
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QStatusBar
 
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.severity import bus_level, worsened_by
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.recording import Tone
+from server_gui.core.desk.recording import LATE, NOTHING, Tone
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, load_text, seen, worst
 from server_gui.views.frame.recording_chip import TONES
@@ -23,6 +25,9 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 FRAMES: Final = 60
+LEAST_FRAMES: Final = 5  # before which nothing is said of the rate: a window that opens is slow
+SLOW_FPS: Final = 8.0  # below which this computer is busy, whatever else it does
+GAP: Final = 8  # between two facts, at text of 100 %
 FRAMES_HINT: Final = (
     "Frames that this window draws a second; while this computer is busy, what is shown is late"
 )
@@ -32,34 +37,59 @@ STOP: Final = (
     "F12: software stop, not an emergency stop",
     "F12: software stop",
 )
+STOPS: Final = (  # while a robot is being commissioned
+    "F12 or Ctrl+Space stops {whom} · software, not a safety-rated emergency stop",
+    "F12 stops {whom}: software, not an emergency stop",
+    "F12: software stop, not an emergency stop",
+    "F12: software stop",
+)
+
+
+class StopWords(ShrinkingLabel):
+    """It asks for as much room as its fullest wording that `hold` has room for, and so does not give way."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._room = 0
+        self.say(*STOP)
+
+    def hold(self, room: int) -> None:
+        """Take up to this much room, before all that is beside it."""
+        if room != self._room:
+            self._room = room
+            self.updateGeometry()
+
+    def minimumSizeHint(self) -> QSize:
+        wide = [self._width(words) for words in self._wordings]
+        return self._size(next((one for one in wide[1:] if one <= self._room), wide[-1]))
 
 
 class StatusBar(QStatusBar):
     """One line."""
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
+    def __init__(self, desk: Desk, theme: Theme, commissioning: Commissioning | None = None) -> None:
         super().__init__()
-        self._desk = desk
+        self._desk, self._commissioning = desk, commissioning
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
         self.computer, self.bus, self.recording = ShrinkingLabel(), ShrinkingLabel(), ShrinkingLabel()
         self._window = ShrinkingLabel()
+        self._theme = theme
         self._icon, self._bus_icon = MarkIcon(theme, 11), MarkIcon(theme, 11)
-        stop = ShrinkingLabel()
-        stop.say(*STOP)
-        stop.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.stop = StopWords()
+        self.stop.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.addWidget(self.computer)
         self.addWidget(self._bus_icon)
         self.addWidget(self.bus)
         self.addWidget(self._icon)
         self.addWidget(self.recording)
-        self.addWidget(stop, 1)
+        self.addWidget(self.stop, 1)
         self.addPermanentWidget(self._window)
         self.setSizeGripEnabled(False)
         theme.changed.connect(self._restyle)
 
     def _restyle(self) -> None:
         """As high as its words at once: else what is around is laid out twice."""
-        for label in (self.computer, self.bus, self.recording, self._window):
+        for label in (self.computer, self.bus, self.recording, self.stop, self._window):
             label.ensurePolished()
         QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)
 
@@ -77,11 +107,32 @@ class StatusBar(QStatusBar):
         self.bus.say(*words)
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
-        is_full = station is not None and station.is_full()
-        rate = f"{self._rate():.0f} fps"
-        self._window.say(*((*(f"{busy} · {rate}" for busy in FULL), rate) if is_full else (rate,)))
-        set_tone(self._window, "warn" if is_full else "")
+        known, is_full = self._rate(), station is not None and station.is_full()
+        is_busy = is_full or (known is not None and known < SLOW_FPS)
+        rate = "– fps" if known is None else f"{known:.0f} fps" if known >= 1.0 else "<1 fps"
+        self._window.say(*(*(f"{busy} · {rate}" for busy in FULL), FULL[-1]) if is_busy else (rate,))
+        set_tone(self._window, "warn" if is_busy else "")
         set_tip(self._window, FRAMES_HINT)
+        self.stop.say(*self._stop_words(station))
+        self._hold_stop()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._hold_stop()
+
+    def _hold_stop(self) -> None:
+        """Let what the key is not go last, after all that stands beside it."""
+        beside = (self.computer, self._bus_icon, self.bus, self._icon, self.recording, self._window)
+        seen = [part.minimumSizeHint().width() for part in beside if not part.isHidden()]
+        self.stop.hold(self.width() - sum(seen) - (len(seen) + 2) * self._theme.px(GAP))
+
+    def _stop_words(self, station: Station | None) -> tuple[str, ...]:
+        """Return what the key stops, the fullest wording first."""
+        commissioning = self._commissioning
+        if commissioning is None or not commissioning.runs:
+            return STOP
+        whom = " and ".join(filter(None, ("" if station is None else station.title, commissioning.name)))
+        return tuple(words.format(whom=whom) for words in STOPS)
 
     def _refresh_recording(self, station: Station | None) -> None:
         address, is_live = (None, False) if station is None else (station.address, station.is_live)
@@ -89,14 +140,19 @@ class StatusBar(QStatusBar):
         self._icon.show_mark(TONES[said.tone])
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
-        short = said.text.partition(" · ")[0]
-        wordings = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        short = " · ".join(filter(None, (said.text.partition(" · ")[0], said.reason)))
+        wordings: tuple[str, ...] = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        if NOTHING in said.text.split(" · "):  # why it is no good, before that it goes on
+            wordings = (*wordings[:2], f"{short}: {NOTHING}", NOTHING)
+        if first == LATE:
+            wordings = (LATE.capitalize(), said.text)
         self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)
 
-    def _rate(self) -> float:
-        if len(self._frames) < 2:
-            return 0.0
+    def _rate(self) -> float | None:
+        """Return the frames a second of late; None while too few are known."""
+        if len(self._frames) < LEAST_FRAMES:
+            return None
         return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
 
 

@@ -38,7 +38,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Stopped after", ""),
+    ("Confirmed after", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
@@ -63,8 +63,9 @@ NOT_KNOWN: Final = "not known"
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 BELOW, ABOVE = "↓", "↑"  # where its words stand
 HINT: Final = (
-    "Time from the latest STOP until this drive reported a state other than enabled, or confirmed it. "
-    "“already off”: it was not enabled before that STOP. “no proof”: it has not reported such a state since"
+    "Time from the latest STOP until this window knew that the drive was off, by its state or its "
+    "confirmation: drives that are told of together have one time. “already off”: it was not enabled before "
+    "that STOP. “no proof”: it has not reported such a state since"
 )
 MOST_ERROR: Final = 280  # wide, in words
 # A drive's states where there is little room; in alarms and on cards they stand in full.
@@ -321,12 +322,13 @@ class JointTable(QTableView):
                 shown = self._with_room(widths)
             if sum(widths[known] for known in shown) <= room:
                 break
-        least = (ANGLE, ERROR) if self._model.errors else (ERROR, ANGLE)  # errors stand below the table, too
+        has_errors = bool(self._model.errors)  # which stand below the table, too
+        least = (TORQUE, ANGLE, ERROR) if has_errors else (ERROR, TORQUE, ANGLE)
         last = (STOP,) if self._model.is_stop_news else ()  # the proof of a STOP goes after all else
-        for column in (TORQUE, *least, *last):
+        for column in (*least, *last):
             if sum(widths[known] for known in shown) > room:
                 shown.discard(column)
-        if sum(widths[known] for known in shown) + widths[ERROR] <= room:
+        if has_errors and sum(widths[known] for known in shown) + widths[ERROR] <= room:
             shown.add(ERROR)
         return widths, shown
 

@@ -8,13 +8,14 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPus
 
 from gateway.units import Units, rounded
 from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.unconfirmed import STOP_AGAIN, unconfirmed
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
 from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
-from server_gui.views.predictions import STOPPED, activity
+from server_gui.views.predictions import AS_KNOWN, STOPPED, activity, is_last_held, no_data
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
@@ -203,10 +204,13 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
     count = enabled_text(station.robot, live=station.is_live)
     if station.stopping.is_unproven:
         known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
-        led = TEXTS[Kind.NOT_STOPPED].mark
-        return led, (led.word,), (f"{known} · {count}", count)
-    if not station.is_live:
+        led = TEXTS[unconfirmed(station.robot)].mark
+        words = (f"{led.word}: {STOP_AGAIN}",) if led.word == Kind.STILL_MOVING.value else ()
+        return led, (*words, led.word), (f"{known} · {count}", count)
+    if not station.is_live and not is_last_held(station):
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
+    if not station.is_live:
+        return TEXTS[Kind.STOPPED].mark, _last_since(station), _last_details(station)
     mark = drives_mark(station.robot)
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
@@ -232,6 +236,18 @@ def _since(station: Station) -> tuple[str, ...]:
     if since_s is None:
         return ("STOPPED",)
     return f"STOPPED since {time_of_day(since_s)}", "STOPPED"
+
+
+def _last_since(station: Station) -> tuple[str, ...]:
+    """Return since when it is stopped; without a link somebody may have reset it meanwhile."""
+    since = _since(station)
+    if station.is_linked:
+        return since
+    return *(f"{said}, {AS_KNOWN}" for said in since), "STOPPED when last seen"
+
+
+def _last_details(station: Station) -> tuple[str, ...]:
+    return " · ".join((*_proven(station), no_data(station))), no_data(station)
 
 
 def _proven(station: Station) -> tuple[str, ...]:

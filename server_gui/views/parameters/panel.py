@@ -45,6 +45,7 @@ EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no 
 NOT_KNOWN: Final = "Whether drives are enabled is not known now."
 ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
 NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
+NO_LINK: Final = "There is no link to the robot: nothing can be stored"
 REVIEW_WIDE: Final = 95  # its button with a number of two digits, at text of 100 %
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
@@ -104,6 +105,8 @@ class ParametersPanel(QWidget):
         for button in (self._compare, self._save, self.store_button):
             button.setEnabled(station is not None and bool(station.known) and editing)
         not_stored = "" if station is None else station.refused(PARAMETER_STORE)
+        if station is not None and not station.is_linked:
+            not_stored = NO_LINK
         if not_stored:
             self.store_button.setEnabled(False)
         set_tip(self.store_button, not_stored or STORING)
@@ -181,7 +184,8 @@ class ParametersPanel(QWidget):
         """Show exactly what would be written."""
         station = self._desk.selected
         if station is not None:
-            self.review.show_changes(station.difference(self._desk.shown.units), _acts(station))
+            now = station.difference(self._desk.shown.units)
+            self.review.show_changes(now, _acts(station), self._desk.whose)
             self.pages.setCurrentIndex(REVIEW)
             # The button that led here gives way: else the next one in the window would have the keyboard.
             self.review.take_keyboard()
@@ -374,7 +378,7 @@ class ParametersPanel(QWidget):
     def _refresh_review(self, station: Station) -> None:
         now = station.difference(self._desk.shown.units)
         if (now, _acts(station)) != (self.review.changes, self.review.acts):
-            self.review.show_changes(now, _acts(station))
+            self.review.show_changes(now, _acts(station), self._desk.whose)
         self.review.say_how_long(*verdict_takes(station))
         if not now:
             self.pages.setCurrentIndex(EDIT)

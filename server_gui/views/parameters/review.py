@@ -19,6 +19,7 @@ from server_gui.core.tuning.edits import ReviewedEdit
 from server_gui.views.parameters.change_blocks import ChangeBlocks, mark_of
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -29,6 +30,8 @@ NAME, OLD, ARROW, NEW, UNIT, BY, ALLOWED, MARK = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, BY, ALLOWED)
 BESIDE: Final = 16  # pixels of the table's frame and its bar
 TRIAL_S: Final = 30
+TITLE: Final = "Review{whose}: this and nothing else is written"
+WRITE_TIP: Final = "One transaction{whose}: all or none, read back. It does not store to flash"
 ALL_OR_NONE: Final = "All or none, read back from the device. Nothing is stored to flash."
 SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
 
@@ -51,9 +54,9 @@ class Review(QWidget):
         self._allowed = False
         self._settled = QTimer(self, singleShot=True)
         self._settled.timeout.connect(lambda: self._enable(self._allowed))
-        title = PlainLabel("Review: this and nothing else is written")
-        title.setObjectName("title")
-        title.setWordWrap(True)
+        self.title = PlainLabel()
+        self.title.setObjectName("title")
+        self.title.setWordWrap(True)
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
         self.table.setAccessibleName("Changes to be written")
@@ -82,7 +85,6 @@ class Review(QWidget):
         self.try_it.clicked.connect(lambda: self.write.emit(self.changes, float(self.seconds.value())))
         self.write_it = QPushButton("Write")
         self.write_it.setObjectName("primary")
-        self.write_it.setToolTip("One transaction: all or none, read back. It does not store to flash")
         self.write_it.clicked.connect(lambda: self.write.emit(self.changes, None))
         self.leave_out = QPushButton("Leave out what is refused")
         self.leave_out.setToolTip("The other changes can be written then")
@@ -102,7 +104,7 @@ class Review(QWidget):
         self.takes.hide()
         everything = QVBoxLayout(self)
         everything.setContentsMargins(0, 0, 0, 0)
-        everything.addWidget(title)
+        everything.addWidget(self.title)
         everything.addWidget(self.table, 1)
         everything.addWidget(self.blocks, 1)
         everything.addWidget(self.said)
@@ -110,8 +112,10 @@ class Review(QWidget):
         everything.addWidget(self.takes)
         everything.addLayout(row)
 
-    def show_changes(self, changes: tuple[ReviewedEdit, ...], acts: str = "") -> None:
-        """Show the changes to be written, and on what that `acts` at once."""
+    def show_changes(self, changes: tuple[ReviewedEdit, ...], acts: str = "", whose: str = "") -> None:
+        """Show the changes to be written, on what that `acts` at once, and `whose` they are."""
+        set_text(self.title, TITLE.format(whose=f" – {whose}" if whose else ""))
+        set_tip(self.write_it, WRITE_TIP.format(whose=f" to {whose}" if whose else ""))
         self.changes, self.acts = changes, acts
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):

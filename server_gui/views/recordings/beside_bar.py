@@ -53,7 +53,8 @@ class BesideBar(QWidget):
             button.setAccessibleName(name)
             set_tip(button, hint)
             button.toggled.connect(wanted)
-        self.close_button = QPushButton("Put away")
+        self.tools.toggled.connect(self.cursors.setHidden)  # the tools have a button for them
+        self.close_button = QPushButton("Close")
         self.close_button.setAccessibleName("Close the second recording")
         set_tip(self.close_button, CLOSE_HINT)
         self.close_button.clicked.connect(self._close)

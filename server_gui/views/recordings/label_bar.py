@@ -25,6 +25,7 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
+LIST: Final = 66  # high, at text of 100 %: three labels, as high as the two rows beside it
 LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
@@ -53,13 +54,16 @@ class LabelBar(QWidget):
         left = QVBoxLayout()
         left.addLayout(self._span_row())
         left.addLayout(self._label_row())
-        left.addWidget(self.said)
-        left.addWidget(self.right)
         left.addStretch(1)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
+        row = QHBoxLayout()
         row.addLayout(left, 3)
         row.addWidget(self.list, 2)
+        everything = QVBoxLayout(self)  # texts have all of the width: beside the list they would be cut
+        everything.setContentsMargins(0, 0, 0, 0)
+        everything.setSpacing(4)
+        everything.addLayout(row)
+        everything.addWidget(self.said)
+        everything.addWidget(self.right)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -150,7 +154,7 @@ class LabelBar(QWidget):
             self._labels.remove(item.data(LABEL_ROLE))
 
     def _restyle(self) -> None:
-        self.list.setMaximumHeight(self._theme.px(96))
+        self.list.setFixedHeight(self._theme.px(LIST))
         self.text.setMinimumWidth(self._theme.px(90))
 
 

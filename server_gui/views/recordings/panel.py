@@ -40,6 +40,11 @@ class Recordings(QStackedWidget):
     def changed(self) -> ComparisonPage:
         return self._changed.view
 
+    @property
+    def is_played(self) -> bool:
+        """Whether one is played, rather than listed or compared."""
+        return self.currentIndex() == PLAYER
+
     def refresh(self) -> None:
         """Show how it is now."""
         if self.currentIndex() == LIST:

@@ -40,11 +40,14 @@ from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.cursors import FLAGS
 from server_gui.views.widgets.files import ask_save
+from server_gui.views.widgets.mark import mark_icon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.workspace.page import AROUND_S, Signals
+from server_gui.views.workspace.plot_area import NO_CURVES
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
@@ -52,10 +55,14 @@ EVENTS_HINT: Final = "Its events; choose one to see its instant"
 NO_EVENTS_HINT: Final = (
     "Nothing happened in it: no gap, no mark, no change of a drive, no line of the journal"
 )
-NOT_REPLAYED: Final = "· without alarms of buses and computers"
+NOT_REPLAYED: Final = (
+    "· trouble of its buses was not recorded",
+    "· without its buses",
+)  # where there is room
 NOT_REPLAYED_HINT: Final = (
-    "What is replayed are the robot's signals: what its buses or computers lacked then does not show"
+    "What is replayed are the robot's signals: it was recorded by another version, without its buses' trouble"
 )
+READING: Final = "reading both recordings …"
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SETTLES: Final = 8  # frames until all plots are there
 SLOW: Final = 5  # frames between two looks at what people read
@@ -70,6 +77,8 @@ class Player(QWidget):
 
     def __init__(self, archive: Archive, theme: Theme) -> None:
         super().__init__()
+        self.setObjectName("playback")  # with a frame: it looks like what is live
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._archive = archive
         self._playback = archive.playback
         self._theme = theme
@@ -152,6 +161,7 @@ class Player(QWidget):
     def show_tape(self) -> None:
         """Show another recording."""
         if self._playback.tape is not None:
+            self.unseen.say(*([""] if self._playback.tape.tells_of_buses else [*NOT_REPLAYED, ""]))
             self.timeline.show_tape(self._playback.tape)
             self.timeline.setFocus()
             self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
@@ -169,6 +179,7 @@ class Player(QWidget):
         self._end_comparing()
         self.beside.open(session)
         self.beside_bar.refresh()
+        self.signals.show_tools(on=False)
         self.labelling.setChecked(self._has_room_for_all)
         self._choice.button(SIGNALS).click()
 
@@ -204,6 +215,8 @@ class Player(QWidget):
     def _refresh_beside(self) -> None:
         """Bring the second recording into the plots once it is there."""
         station, scene = self.beside.station, self.signals.scene
+        is_read = self.beside.session is None or bool(self.beside.problem)
+        set_text(self.signals.empty, NO_CURVES if is_read else READING)
         if station is not None and scene.beside is None and self._before is not None:
             self.beside_bar.close_button.click()  # it was put away in the menu of the signals
         elif station is not None and (scene.beside is None or scene.beside.station is not station):
@@ -283,9 +296,7 @@ class Player(QWidget):
         self._speed.setAccessibleName("Speed of the playback")
         self._speed.currentIndexChanged.connect(self._set_speed)
         self.place = PlainLabel()
-        self.unseen = ElidedLabel("dim", Qt.TextElideMode.ElideRight)
-        self.unseen.setText(NOT_REPLAYED)
-        self.unseen.setAccessibleName(NOT_REPLAYED)
+        self.unseen = ShrinkingLabel("dim")
         set_tip(self.unseen, NOT_REPLAYED_HINT)
         self.export = QPushButton("Export")
         menu = QMenu(self.export)
@@ -375,7 +386,8 @@ class Player(QWidget):
         for flag in self._in_order:
             at = clock_text((flag.at_ns - tape.first_ns) / SECOND_NS, 1)
             text = plain(f"{at}  {self.timeline.told(flag)}").replace("&", "&&")
-            menu.addAction(text).triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
+            action = menu.addAction(mark_icon(self._theme, FLAGS[flag.kind]), text)
+            action.triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
 
     @property
     def _in_order(self) -> list[Flag]:

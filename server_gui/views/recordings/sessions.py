@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Final
 
+import msgspec
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
@@ -24,7 +25,7 @@ from gateway.plain_text import plain
 from ml.store.sessions import UNREAD, Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.store_reach import AGAIN
-from server_gui.core.cloud.tape import Tape
+from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.desk.flags import Flag, of_events
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
@@ -49,7 +50,8 @@ ROW: Final = 21  # high, at text of 100 %
 LINES: Final = 6  # of notes, at most
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
-PARTIAL: Final = "only what is still on this computer; the store is not reached"
+REST: Final = "the rest is in the store, which is not reached"
+MORE: Final = "the store, which may have more of it, is not reached"
 OTHERS: Final = "others may be in the store"
 GOES_ON: Final = "goes on"
 NOW: Final = "recorded now"
@@ -82,7 +84,7 @@ class SessionModel(RowsModel[Session]):
             case _ if role == SORT_ROLE:
                 return _keys(session)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return tip("\n".join(filter(None, (session.session, session.notes))))
+                return tip("\n".join(filter(None, (session.session, _notes(session)))))
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
@@ -254,9 +256,19 @@ class SessionsPage(QWidget):
         known = (session, archive.tape, archive.problem, archive.shown_units, is_now)
         if known != self._told:
             self._told = known
-            self._card.set_title("Recording" if session is None else session.session)
             held = [] if session is None else archive.held_then(session)
-            self.details.setPlainText(facts_text(session, archive.tape, archive.problem, held, is_now=is_now))
+            words = None if session is None else self._words(session)
+            told = facts_text(session, archive.tape, archive.problem, held, is_now=is_now, words=words)
+            self.details.setPlainText(told)
+
+    def _words(self, session: Session) -> Session | None:
+        """Return what people said of it, as whoever records it knows, or as the store had it before."""
+        report, known = self._recording.report, self._archive.library.known_before(session)
+        links = () if report is None else report.robots.values()
+        link = next((one for one in links if one.session == session.session), None)
+        if link is None:
+            return known
+        return msgspec.structs.replace(known or session, notes=link.notes, wearer=link.wearer)
 
     # --- how it is put together
 
@@ -302,8 +314,13 @@ def _cells(session: Session, *, is_now: bool = False) -> tuple[str, ...]:
         size(session.size_bytes) if session.rows else "–",
         NOW if is_now else _state(session),
         session.operator,
-        session.notes,
+        _notes(session),
     )
+
+
+def _notes(session: Session) -> str:
+    """Return what people noted; that the store is not reached is said elsewhere."""
+    return "" if session.notes == UNREAD else session.notes
 
 
 def _began(session: Session) -> datetime | None:
@@ -336,12 +353,22 @@ def _when(time: datetime | None) -> str:
 
 
 def facts_text(
-    session: Session | None, tape: Tape | None, problem: str, held: Sequence[str], *, is_now: bool = False
+    session: Session | None,
+    tape: Tape | None,
+    problem: str,
+    held: Sequence[str],
+    *,
+    is_now: bool = False,
+    words: Session | None = None,
 ) -> str:
-    """Return the facts of a session as text; `is_now`: it is recorded now."""
+    """Return the facts of a session as text; `is_now`: it is recorded now.
+
+    `words` has what people said of it, where the store that has that is not reached.
+    """
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     away = session.notes == UNREAD or (tape is not None and tape.is_partial)
+    told = words if words is not None and session.notes == UNREAD else session
     known = {
         "Session": session.session,
         "Robot": session.robot,
@@ -349,8 +376,10 @@ def facts_text(
         "Ended": _ended(session, is_now=is_now),
         "Length": _length(session, away=away, is_now=is_now),
         "State": "" if is_now else _state(session),
-        "Operator": session.operator,
-        "Notes": session.notes,
+        "Operator": told.operator,
+        "Wearer": told.wearer,
+        "Notes": told.notes if words is not None or session.notes != UNREAD else NOT_KNOWN,
+        "Here": _here(session, tape, away=away),
         "Software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),
     }
     lines = [f"{name}: {value}" for name, value in known.items() if value]
@@ -379,13 +408,27 @@ def _length(session: Session, *, away: bool, is_now: bool) -> str:
     return f"it {GOES_ON}; kept so far: {rows} rows, {size_}" if is_now else f"{length}, {rows} rows, {size_}"
 
 
+def _here(session: Session, tape: Tape | None, *, away: bool) -> str:
+    """Return what of it is on this computer alone, by its times; "" where all of it can be read."""
+    if not away:
+        return ""
+    rest = REST if session.notes == UNREAD else MORE
+    if tape is None:
+        return rest
+    first, last = (_when(as_time(at_ns)) for at_ns in (tape.first_ns, tape.last_ns))
+    day, _, time = last.partition(" ")
+    return (
+        f"only {first[-8:]} to {time if first.startswith(day) else last} of it are on this computer; {rest}"
+    )
+
+
 def _inside(tape: Tape, *, is_partial: bool, is_now: bool) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
     head = f"{length} of {len(tape.units)} channels"
-    if is_now:
-        head = f"Its first {length} can be played by now, {len(tape.units)} channels"
     if is_partial:
-        head = f"{head}: {PARTIAL}"
+        head = f"{head} can be played"
+    elif is_now:
+        head = f"Its first {length} can be played by now, {len(tape.units)} channels"
     if not tape.events:
         return [head] if is_partial else [head, "It has no gaps and no marks."]
     return [head, "", *(_event(tape, flag) for flag in of_events(tape.events[:EVENTS_TOLD]))]

@@ -6,17 +6,29 @@ from functools import partial
 from typing import Final
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QDialog, QFormLayout, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QCloseEvent, QFontDatabase
+from PySide6.QtWidgets import (
+    QApplication,
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from gateway.client import Address
 from gateway.client import pairing as desk
+from gateway.wire.pairing import is_link
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH: Final = 460
+TITLE: Final = "Pair with a robot"
+COMMAND: Final = "sudo gwrms keys pair"
 HOW: Final = (
-    "On the robot: sudo gwrms keys pair. It shows its address and a code, for five minutes. Type both here, "
-    "or the link. Then somebody there says what this desk may do."
+    "It shows its address and a code, for five minutes. Enter both here, or paste the link. Someone at the "
+    "robot then chooses what this desk may do."
 )
 WAITS: Final = "Waiting for confirmation on the robot: the name and role of this desk …"
 
@@ -62,7 +74,7 @@ class PairingDialog(QDialog):
 
     def __init__(self, parent: QWidget | None = None, where: str = "") -> None:
         super().__init__(parent)
-        self.setWindowTitle("Pair with a robot")
+        self.setWindowTitle(TITLE)
         self.setModal(False)
         self.attempt: Attempt | None = None
         self.address, self.code, self.name = QLineEdit(where), QLineEdit(), QLineEdit()
@@ -80,7 +92,10 @@ class PairingDialog(QDialog):
         self.cancel.clicked.connect(self.reject)
         self.act.clicked.connect(self._begin)
         self.finished.connect(self.give_up)
+        for field in (self.address, self.code):
+            field.textChanged.connect(self._allow)
         self._lay_out()
+        self._allow()
         (self.code if where else self.address).setFocus()
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -88,7 +103,8 @@ class PairingDialog(QDialog):
         super().closeEvent(event)
 
     def _lay_out(self) -> None:
-        how = PlainLabel(HOW)
+        heading, how = PlainLabel(TITLE), PlainLabel(HOW)
+        heading.setObjectName("title")
         how.setWordWrap(True)
         how.setMinimumWidth(WIDTH)
         form = QFormLayout()
@@ -103,10 +119,36 @@ class PairingDialog(QDialog):
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 14, 16, 12)
         column.setSpacing(12)
+        column.addWidget(heading)
+        column.addWidget(PlainLabel("On the robot, run:"))
+        column.addLayout(self._command())
         column.addWidget(how)
         column.addLayout(form)
         column.addWidget(self.said)
         column.addLayout(buttons)
+
+    def _command(self) -> QHBoxLayout:
+        """Return what is to be run, to be read and copied."""
+        command, copy = QLineEdit(COMMAND), QPushButton("Copy")
+        command.setReadOnly(True)
+        command.setAccessibleName("Command to run on the robot")
+        command.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+        font.setPixelSize(self.fontInfo().pixelSize())
+        command.setFont(font)
+        copy.setAccessibleName("Copy the command")
+        copy.setAutoDefault(False)
+        copy.clicked.connect(lambda: QApplication.clipboard().setText(COMMAND))
+        row = QHBoxLayout()
+        row.addWidget(command, 1)
+        row.addWidget(copy)
+        return row
+
+    def _allow(self) -> None:
+        """Offer to pair once there is something to pair with: a link has the code in it."""
+        where = self.address.text().strip()
+        can = bool(where) and (bool(self.code.text().strip()) or is_link(where))
+        self.act.setEnabled(can and self.attempt is None)
 
     def _begin(self) -> None:
         try:
@@ -122,6 +164,7 @@ class PairingDialog(QDialog):
     def _ended(self, found: desk.Paired | Exception) -> None:
         self._end_attempt()
         self._enable(True)
+        self._allow()
         if isinstance(found, Exception):
             self._say(str(found), "bad")
             return

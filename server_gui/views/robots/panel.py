@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
+from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -216,6 +217,9 @@ class RobotsPanel(QWidget):
             self._add_card(station)
         for card in self.cards:
             card.refresh(selected=card.station is self._desk.selected)
+        is_light = not all(card.stop.has_room_in_bold for card in self.cards)
+        for card in self.cards:  # names in one weight: none looks more important
+            card.stop.be_light(is_light)
         self.all_stop.setEnabled(bool(stations))
         self.none.setVisible(not stations)
 
@@ -232,8 +236,12 @@ class RobotsPanel(QWidget):
         self._list.insertWidget(self._list.count() - 1, card)
 
     def _ask_to_remove(self, station: Station) -> None:
+        goes = ""
+        if station.is_live and any_enabled(station.robot):
+            does = "walks" if station.processing.derived().gait.walking else "has enabled drives"
+            goes = f"{station.title} {does}: its STOP leaves this window.\n\n"
         text = (
-            f"Remove {station.title} ({station.address}) from this window?\n\n"
+            f"{goes}Remove {station.title} ({station.address}) from this window?\n\n"
             "Nothing of it is stopped: it goes on as it is, but no longer in sight, and STOP of this window "
             "does not reach it any more. What this window has on trial there goes back. Its recording by "
             "this window ends; what is recorded is kept."

@@ -8,6 +8,7 @@ from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.unconfirmed import remedy, silent_controllers
 from server_gui.core.desk.station import Station
 from server_gui.views.confirmation import Question, ask
 
@@ -18,8 +19,18 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     """Ask whether a held stop is to be ended."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
+    held = f"{_unconfirmed(station)}{held}"
     text = f"{held}\n\n{DOES}\n\nAfterwards, {go_on(Kind.RESET, station.robot)}."
     return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
+
+
+def _unconfirmed(station: Station) -> str:
+    """Return first that the STOP is not confirmed, by whom, and what to do: a reset is no answer to that."""
+    if not station.stopping.is_unproven:
+        return ""
+    why = silent_controllers(station.robot, station.stopping) or station.stopping.why
+    first = ", ".join(remedy(station.robot, station.stopping))
+    return f"STOP NOT CONFIRMED: {why}. First {first}.\n\n"
 
 
 def ask_clear(parent: QWidget, station: Station) -> Question:

@@ -16,6 +16,7 @@ LETTERS: Final = ("A", "B")
 NEAR_PX: Final = 6  # from a cursor or a flag, to mean it
 FLAGS: Final = {
     FlagKind.STOP: Mark("square", "bad", "stop"),
+    FlagKind.UNPROVEN: Mark("box", "bad", "stop not confirmed"),
     FlagKind.FAULT: Mark("triangle", "bad", "fault"),
     FlagKind.WRITE: Mark("disc", "accent", "write"),
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
@@ -28,6 +29,7 @@ FLAGS: Final = {
     FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }
 FIRST: Final = (
+    FlagKind.UNPROVEN,
     FlagKind.FAULT,
     FlagKind.STOP,
     FlagKind.DANGER,

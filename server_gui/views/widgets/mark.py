@@ -1,17 +1,33 @@
 """A state's shape as a small widget."""
 
-from PySide6.QtCore import QRectF, QSize
-from PySide6.QtGui import QPainter, QPaintEvent
+from typing import Final
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QIcon, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
 
+SIDE: Final = 11  # at text of 100 %
+
+
+def mark_icon(theme: Theme, mark: Mark) -> QIcon:
+    """Return a mark for a line of a menu."""
+    side = theme.px(SIDE)
+    drawn = QPixmap(side, side)
+    drawn.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(drawn)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    draw(painter, mark, theme.colour(mark.colour), QRectF(0, 0, side, side))
+    painter.end()
+    return QIcon(drawn)
+
 
 class MarkIcon(QWidget):
     """Draws a mark; redraws only when it becomes another."""
 
-    def __init__(self, theme: Theme, size: int = 11, parent: QWidget | None = None) -> None:
+    def __init__(self, theme: Theme, size: int = SIDE, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._theme = theme
         self._pixels = size

@@ -217,11 +217,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         live: bool,
         scale: float = 1.0,
         end: str = NOW,
+        since_s: float | None = None,
     ) -> None:
         """Draw a column a curve, times `scale`, over the times; grey where not `live`.
 
-        Times (s) rise; the last is `LAST` where not `live`, else what `end` says. Rows of one `source` are
-        only ever added.
+        Times (s) rise; the last is `LAST` where not `live`, else what `end` says; in a recording `since_s`
+        after its beginning, if given. Rows of one `source` are only ever added.
         """
         (left, right), _ = self.getViewBox().viewRange()
         if len(times) and right < 0.0:
@@ -236,7 +237,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
-        self.getPlotItem().getAxis("bottom").set_end(end if live else LAST)
+        if self.getPlotItem().getAxis("bottom").set_end(end if live else LAST, since_s):
+            self.viewport().update()  # with the curves: the scene alone would be drawn a frame later
         self._mark()
 
     def draw_anew(self) -> None:

@@ -33,6 +33,7 @@ class StopButton(QPushButton):
         super().__init__("STOP", parent)
         self.most: int | None = None  # wide; None: as the layout has it
         self._robot: str | None = None
+        self._is_light = False
         self.setObjectName(name)
         self.setToolTip(HINT)
         self.setAccessibleDescription(HINT)
@@ -53,6 +54,20 @@ class StopButton(QPushButton):
         if most != self.most:
             self.most = most
             self.updateGeometry()
+
+    def be_light(self, is_light: bool) -> None:
+        """Have the name in light letters, as those beside it that have no room for others."""
+        if is_light is not self._is_light:
+            self._is_light = is_light
+            self.update()
+
+    @property
+    def has_room_in_bold(self) -> bool:
+        """Whether all of the name has room in one line of bold letters."""
+        small = QFont(QApplication.font())
+        small.setBold(True)
+        room = self.width() - self._around - self._word - self._gap
+        return self._robot is None or QFontMetrics(small).horizontalAdvance(self._robot) <= room
 
     @property
     def lines(self) -> list[str]:
@@ -126,6 +141,8 @@ class StopButton(QPushButton):
         forms = [(one, large), (one, small), (one, light), (two, small), (two, light)]
         if super().sizeHint().height() < 2 * QFontMetrics(small).lineSpacing():
             forms, two = forms[:3], one
+        if self._is_light:
+            forms = [(lines, font) for lines, font in forms if not font.bold()]
         for lines, font in forms:
             if all(QFontMetrics(font).horizontalAdvance(line) <= room for line in lines):
                 return lines, font

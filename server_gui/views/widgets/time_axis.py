@@ -21,6 +21,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     def __init__(self) -> None:
         self._label_px = 50
         self._end = NOW
+        self._since_s: float | None = None
         super().__init__("bottom")
         self.setStyle(hideOverlappingLabels=False)  # else those at its ends are left out
 
@@ -30,12 +31,17 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self.picture = None
         self.update()
 
-    def set_end(self, word: str) -> None:
-        """Set what its last place is called: `NOW`, `LAST`, `PAUSED` or `SHOWN`."""
-        if word != self._end:
-            self._end = word
+    def set_end(self, word: str, since_s: float | None = None) -> bool:
+        """Set what its last place is called: `NOW`, `LAST`, `PAUSED` or `SHOWN`; return whether it is new.
+
+        With `since_s`, how long after the beginning of a recording it is, every place is called so.
+        """
+        is_new = (word, since_s) != (self._end, self._since_s)
+        if is_new:
+            self._end, self._since_s = word, since_s
             self.picture = None
             self.update()
+        return is_new
 
     def boundingRect(self) -> QRectF:
         """With room for the words at its ends."""
@@ -45,12 +51,23 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
         """Return how far places are apart: as near as there is room for what stands there."""
         least = (high - low) * self._label_px / max(size, 1.0)
-        return [(next((step for step in STEPS_S if step >= least), STEPS_S[-1]), 0.0)]
+        step = next((step for step in STEPS_S if step >= least), STEPS_S[-1])
+        return [(step, 0.0 if self._since_s is None else -self._since_s % step)]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Return the labels of these places."""
+        since_s = self._since_s
+        if since_s is not None:
+            return [session_text(since_s + value, spacing) for value in values]
         said = [time_text(value) for value in values]
         return [self._end if text == NOW else text for text in said]
+
+
+def session_text(seconds: float, step_s: float) -> str:
+    """Return a time since the beginning of a recording, m:ss, as fine as places are apart."""
+    digits = 0 if step_s >= 1.0 else 1 if step_s >= 0.1 else 2
+    minutes, rest = divmod(round(max(seconds, 0.0), digits), 60)
+    return f"{int(minutes)}:{rest:0{3 + digits if digits else 2}.{digits}f}"
 
 
 def time_text(seconds: float) -> str:

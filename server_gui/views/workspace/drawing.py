@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from server_gui.core.archive.playback import PlayedRobot
 from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.curve_binding import BESIDE
@@ -41,7 +42,14 @@ def _draw_plot(scene: Scene, card: UnitPlot, station: Station, times: Floats, *,
         card.plot.draw_anew()
     source = station.rings.source if scene.frozen is None else scene.frozen
     end = PAUSED if scene.frozen is not None else SHOWN if station.robot.is_recording else NOW
-    card.plot.draw(source, times, columns, live=live, scale=card.unit.scale, end=end)
+    since_s = _session_s(scene, station)
+    card.plot.draw(source, times, columns, live=live, scale=card.unit.scale, end=end, since_s=since_s)
+
+
+def _session_s(scene: Scene, station: Station) -> float | None:
+    """Return when the newest row of a recording that stands still was, as its bar counts; else None."""
+    frozen, robot = scene.frozen, station.robot
+    return None if frozen is None or not isinstance(robot, PlayedRobot) else robot.session_s(frozen.newest_ns)
 
 
 def _comes_late(scene: Scene, card: UnitPlot) -> bool:

@@ -19,6 +19,7 @@ from server_gui.views.workspace.xy_plot import XYPlot
 
 TWO: Final = 600  # wide at least, at text of 100 %: two columns
 COLUMNS: Final = 2
+NO_CURVES: Final = "Tick channels at the left to see them here, or drag them to a place."
 
 
 class PlotArea(QFrame):
@@ -36,7 +37,7 @@ class PlotArea(QFrame):
         self._theme = theme
         self.cards: list[AnyPlot] = []
         self.built = -1  # revision of the workspace that the plots are of
-        self.empty = PlainLabel("Tick channels at the left to see them here, or drag them to a place.")
+        self.empty = PlainLabel(NO_CURVES)
         self.empty.setWordWrap(True)
         self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.empty.setObjectName("dim")

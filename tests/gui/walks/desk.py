@@ -113,7 +113,7 @@ def recording(bench: Bench) -> None:
     """It is stopped and begun by hand, with a name; and a disk that refuses is told at once."""
     hand = bench.hand
     hand.key("ctrl+r")
-    hand.sees("Stop recording every robot")
+    hand.sees("nothing else that they send is kept")
     hand.keep("stop-recording")
     hand.click("Stop recording", exactly=True, place=-1)
     hand.sees("Not recording")
@@ -168,7 +168,7 @@ def uploaded(bench: Bench) -> None:
     hand = bench.hand
     hand.click("Cloud")
     hand.click("Look again")
-    hand.sees("no batches wait", within_s=AGAIN_S)
+    hand.sees("nothing waits", within_s=AGAIN_S)
     hand.sees("telemetry", within_s=AGAIN_S)
     hand.keep("cloud")
     hand.click("Overview")

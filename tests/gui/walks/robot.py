@@ -67,7 +67,7 @@ def link_cut(bench: Bench) -> None:
     hand.misses("No alarms")
     hand.keep("no-link")
     bench.mend()
-    hand.sees("still moving", within_s=AGAIN_S)
+    hand.sees("STILL MOVING", within_s=AGAIN_S)
     hand.keep("still-moving")
     hand.key("ctrl+space")
     hand.sees("STOPPED", "confirmed by all 6 drives")

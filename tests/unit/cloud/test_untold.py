@@ -7,6 +7,7 @@ import sqlite3
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from gateway.main import main
@@ -17,7 +18,7 @@ from ml.training.recorded import recorded
 from server_gui.core.archive.library import look
 from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.recordings import Recordings
-from server_gui.core.cloud.tape import Tape
+from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
@@ -96,6 +97,10 @@ def test_a_session_that_is_told_of_in_the_spool_is_listed_once(tmp_path: Path, f
     assert (shown.rows, shown.notes, shown.uploaded) == (ROWS, "", True)
 
 
+def clock(at_ns: int) -> str:
+    return f"{as_time(at_ns).astimezone():%H:%M:%S}"
+
+
 def test_while_the_store_is_away_the_rest_of_a_session_is_not_called_lost(
     tmp_path: Path, folder_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,7 +120,13 @@ def test_while_the_store_is_away_the_rest_of_a_session_is_not_called_lost(
     began = datetime.strptime(name.partition("-")[0], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
     assert f"Began: {began.astimezone():%Y-%m-%d %H:%M:%S}" in said, "its name tells"
     assert "Length: not known while the store is not reached" in said
-    assert "only what is still on this computer; the store is not reached" in said
+    assert f"Here: only {clock(tape.first_ns)} to {clock(tape.last_ns)} of it are on this computer; " in said
+    assert "the rest is in the store, which is not reached" in said
+    assert "first" not in said, "what is left is the last part of it, as far as anybody knows"
+    assert "Notes: not known while the store is not reached" in said, "they are the user's words alone"
+    before = msgspec.structs.replace(shown, notes="P01, stairs", operator="Ada", wearer="P01")
+    said = facts_text(shown, tape, "", (), words=before)
+    assert "Operator: Ada\nWearer: P01\nNotes: P01, stairs\nHere: only" in said
     assert "no gaps" not in said
     here = ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))
     assert not Tape.open(here, shown).is_partial, "nothing was uploaded yet, so all of it is here"

@@ -261,30 +261,6 @@ def test_rows_from_before_the_stop_prove_nothing(bench: Bench) -> None:
     assert bench.station.stopping.proofs == {}
 
 
-def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
-    _link_lost(bench)
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("there is no link"))
-    assert kinds(bench.station) == [Kind.NOT_STOPPED, Kind.NO_LINK]
-    assert "still moving" not in bench.station.alarms.active[0].alarm.line
-    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
-    assert "still moving: STOP again" in bench.station.alarms.active[0].alarm.line
-    assert bench.station.mark.word == "STOP NOT CONFIRMED"
-
-
-def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    bench.station.take([states(5.0, left_knee=4.0)])
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("there is no link"))
-    bench.station.take([states(5.0)])
-    proofs = bench.station.stopping.proofs
-    assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
-    assert proofs["left_hip"].when == "already off"
-
-
 def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_already(bench: Bench) -> None:
     bench.station.take([states(4.0)])
     sent = bench.station.send_stop("a key, in a thread of its own")
@@ -494,3 +470,27 @@ def test_devices_that_a_gateway_begins_to_read_are_one_alarm_and_not_lost(bench:
     assert one.alarm.line == "no data yet: devices: not read yet: left hip, left knee"
     assert bench.station.mark.colour == "old"
     assert not [item for item in bench.station.news.items if item.kind is NewsKind.LOST]
+
+
+def test_data_that_comes_in_bursts_are_silent_since_the_newest_row(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said for 34 s while the newest row was 3 s old."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 0)
+    found = []
+    for _ in range(2):
+        bench.station.take([walking(2)])
+        (one,) = (one for one in bench.station.alarms.active if one.alarm.kind is Kind.STALE)
+        found.append(one)
+        assert bench.station.robot.now_s() - one.since_s == pytest.approx(
+            bench.station.robot.age_s() or 0.0, abs=0.05
+        )
+    assert found[1].since_s > found[0].since_s
+
+
+def test_how_long_a_heartbeat_is_missing_is_what_it_was_at_least(bench: Bench) -> None:
+    """It said for 0.2 s beside for 2 s."""
+    problem = "its heartbeat has been missing for 0.2 s: check the node's power and cable"
+    bench.station.take([looked(state="stale", problem=problem)])
+    (one,) = bench.station.alarms.active
+    assert one.alarm.what == "its heartbeat has been missing for more than 0.2 s"

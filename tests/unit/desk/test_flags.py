@@ -1,13 +1,16 @@
 """What has happened is found in rows, in the journal and among a recording's events, once each."""
 
 import datetime
+import time
 from types import SimpleNamespace
 from typing import cast
 
 import msgspec
 
 from drivers.error_codes import error_text
+from gateway.client import ConnectionState, NotConnected
 from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.wire.stop import Stopped
 from server_gui.core.desk.flags import (
     Flag,
     FlagKind,
@@ -19,10 +22,10 @@ from server_gui.core.desk.flags import (
 )
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.fleet.robot_recording import RobotRecording
-from server_gui.core.follow.events import BusesSeen, Described
+from server_gui.core.follow.events import BusesSeen, Described, LinkChanged
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
-from tests.support.desk import Bench, described, telemetry
+from tests.support.desk import JOINTS, Bench, described, telemetry, walking
 
 WORDS = {
     name: {"4": "operation enabled", "5": "quick stop active", "7": "fault"}
@@ -67,27 +70,44 @@ def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
     entries = [
         entry("stop", 5, who="jkim", reason="F12"),
         entry("write", 6, who="jkim", after={"gait.step": 1}),
-        entry("write", 7, after={"a.b": 1}, trial_s=9.0),
+        entry("write", 7, before={"a.b": 0.5}, after={"a.b": 1}, trial_s=9.0),
         entry("stop", 8, boot_id="another"),
         entry("control acquired", 9),
     ]
     assert list(of_journal(entries, "b")) == [
         Flag(5, "stop by jkim: F12", FlagKind.STOP),
         Flag(6, "write gait.step by jkim", FlagKind.WRITE),
-        Flag(7, "write a.b", FlagKind.TRIAL),
+        Flag(7, "write a.b 0.5 → 1", FlagKind.TRIAL),
     ]
     assert [flag.at_ns for flag in of_recorded_journal(entries)] == [50, 60, 70, 80]
 
 
+def test_what_a_window_wrote_is_told_without_its_port() -> None:
+    here, there = (
+        entry(
+            "write",
+            at,
+            who=f"gwrms gui ({host}:33912)",
+            before={"gait.step": 400.0},
+            after={"gait.step": 420.0},
+        )
+        for at, host in ((1, "127.0.0.1"), (2, "10.0.0.7"))
+    )
+    assert [flag.text for flag in of_journal([here, there], "b")] == [
+        "write gait.step 400 → 420 from the window",
+        "write gait.step 400 → 420 from the window on 10.0.0.7",
+    ]
+
+
 def test_a_trial_that_the_robot_took_back_is_told_with_why() -> None:
     entries = [
-        entry("taken back", 5, who="gateway", reason="its time was over"),
+        entry("taken back", 5, who="gateway", reason="time ran out"),
         entry("taken back", 5, who="gateway", reason="asked for"),
         entry("stop", 6, who="guard", reason="knee_heat: 71 N·m"),
     ]
     assert [flag.text for flag in of_journal(entries, "b")] == [
-        "taken back: its time was over",
-        "taken back: as somebody asked for",
+        "taken back: time ran out",
+        "taken back on request",
         "stop by guard: knee_heat: 71 N·m",
     ]
 
@@ -199,3 +219,18 @@ def test_the_trouble_of_a_bus_is_recorded_and_flagged_in_the_replay() -> None:
     utc = datetime.datetime(2026, 11, 28, tzinfo=datetime.UTC)
     (flag,) = of_events([{"kind": EventKind.BUS.value, "utc": utc, "text": "can0: bus off"}])
     assert (flag.kind, flag.text) == (FlagKind.BUS, "can0: bus off")
+
+
+def test_a_stop_that_is_not_confirmed_has_a_flag_also_where_no_data_came(bench: Bench) -> None:
+    station = bench.station
+    station.take([described(), walking(10)])
+    newest_ns = station.rings.newest_ns or 0
+    station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    station.stop("test")
+    bench.first.fail(NotConnected("nothing was sent; there is no link"))
+    (flag,) = (one for one in station.flags if one.kind is FlagKind.UNPROVEN)
+    assert flag.text == "STOP NOT CONFIRMED: nothing was sent; there is no link"
+    assert newest_ns < flag.at_ns < newest_ns + 5_000_000_000
+    station.stop("again")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    assert [one.kind for one in station.flags].count(FlagKind.UNPROVEN) == 1

@@ -1,5 +1,7 @@
 """How to go on after a stop, as the robot's gateway may: an observer enables nothing."""
 
+from pathlib import Path
+
 import pytest
 from msgspec.structs import replace
 
@@ -7,12 +9,13 @@ from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.overload import THEIRS, load_first
 from server_gui.core.alarms.robot_alarms import go_on
-from server_gui.core.alarms.simulated import NO_WIRES, advised, without_wires
+from server_gui.core.alarms.simulated import FAULTS, NO_WIRES, advised, without_wires
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.resetting import after_reset
 from server_gui.core.follow.events import Described
 from server_gui.core.follow.robot import Robot
+from server_gui.processes.sim_control import start_command
 from tests.support.desk import Bench, described
 
 BUS = "check termination, wiring and bitrate"
@@ -27,17 +30,17 @@ def test_an_observer_s_user_is_told_to_start_the_controller(kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("kind", [Kind.RESET, Kind.STOPPED])
-def test_the_simulator_is_spoken_of_only_where_the_robot_is_one(kind: Kind) -> None:
-    said = check_of(kind, role="observer", simulated=True)
-    assert "Start walking, or gwrms sim-fault --dir DIR --controller start" in said
-    assert "sim-fault" not in check_of(kind, role="observer")
-    bench = Bench(Desk())
-    station = bench.add("exo-01")
+def test_what_starts_a_simulator_is_said_only_where_it_is_known_and_then_with_its_folder(kind: Kind) -> None:
+    """It named a button that only the demo has, and a folder DIR."""
+    station = Bench(Desk()).add("exo-01")
     known = described().description
-    for vendor, simulated in (("maxon motor ag", False), ("GWRMS", True)):
-        parts = [replace(one, device={"node_id": 2, "vendor": vendor}) for one in known.components]
-        station.take([Described(replace(known, components=parts))])
-        assert ("sim-fault" in go_on(kind, station.robot)) is simulated
+    parts = [replace(one, device={"node_id": 2, "vendor": "GWRMS"}) for one in known.components]
+    station.take([Described(replace(known, components=parts, role="observer"))])
+    for absent in ("sim-fault", "Start walking", "DIR"):
+        assert absent not in go_on(kind, station.robot)
+    station.robot.start_by = f"Start walking, or {start_command(Path('/tmp/my demo'))}"
+    said = "(Start walking, or gwrms sim-fault --dir '/tmp/my demo' --controller start)"
+    assert said in go_on(kind, station.robot)
 
 
 def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
@@ -48,6 +51,29 @@ def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
         robot.apply(Described(replace(known, components=parts)))
         (one,) = without_wires([alarm], robot)
         assert one.check == check
+
+
+@pytest.mark.parametrize("kind", [Kind.PART_STALE, Kind.LOST])
+def test_no_simulated_part_has_a_cable_and_a_load_is_looked_at_first(kind: Kind) -> None:
+    robot, known = Robot(), described().description
+    parts = [replace(one, device={"vendor": "GWRMS"}) for one in known.components]
+    alarm = Alarm(kind, "left_knee", "no heartbeat", check="check the node's power and cable")
+    (one,) = without_wires([alarm], robot)
+    assert one.check == alarm.check, "nobody knows that it is simulated"
+    robot.apply(Described(replace(known, components=parts)))
+    (one,) = without_wires([alarm], robot)
+    assert one.check == NO_WIRES
+    (first,) = load_first([one], (THEIRS,), 10, wired=False)
+    assert first.check == f"{THEIRS}; then {FAULTS}"
+    gone = Alarm(kind, "left_knee", "/dev/pts/3 does not exist", check="plug the device in")
+    assert next(without_wires([gone], robot)).check == gone.check
+
+
+def test_an_overloaded_computer_is_named_once() -> None:
+    alarm = Alarm(
+        Kind.BUS, "bus.main", "20 % of its PDOs are missing; the robot's computer is overloaded", check=BUS
+    )
+    assert [one.check for one in load_first([alarm], (THEIRS,), 10)] == [BUS]
 
 
 def test_of_a_simulated_robot_only_the_wiring_is_left_out_of_what_to_check() -> None:

@@ -1,8 +1,9 @@
 """What store and spool hold, and jobs on them: told, tried again, cancelled."""
 
 import threading
+import time
 from collections.abc import Iterator
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -10,7 +11,7 @@ import pytest
 
 from ml.store import Store
 from ml.store.sessions import find
-from server_gui.core.archive.library import Library, look
+from server_gui.core.archive.library import Library, _local, look
 from server_gui.core.cloud import actions
 from server_gui.core.cloud.jobs import Cancelled, Job, Jobs, JobState
 from server_gui.core.cloud.selection import Choice
@@ -212,3 +213,10 @@ def test_what_waits_for_upload_is_exported_too_and_once(
     copied.rename(tmp_path / "spool" / "00000001.db")
     job = over(jobs.add("export", export))
     assert job.said.endswith(f"walk.csv: {BATCHES * ROWS} rows")
+
+
+def test_times_of_today_are_told_as_the_clock_on_the_wall_and_others_with_their_day() -> None:
+    now_s = time.time()
+    now, before = (datetime.fromtimestamp(at_s).astimezone() for at_s in (now_s, now_s - 3 * 86_400))
+    assert _local(now_s) == f"{now:%H:%M:%S}"
+    assert _local(before.timestamp()) == f"{before:%Y-%m-%d %H:%M:%S}"

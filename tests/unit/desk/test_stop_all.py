@@ -9,7 +9,7 @@ from gateway.wire.stop import Reset, Stopped
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
-from tests.support.desk import JOINTS, Bench, described, looked, walking
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 OFF = Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False)
@@ -81,7 +81,7 @@ def test_where_nothing_is_known_of_any_drive_none_is_counted(two: Bench) -> None
     two.commands[1].fail(NotConnected("no gateway there; is it running?"))
     two.desk.stations[0].reset()
     two.commands[0].answer(OFF)
-    assert said(two).startswith("STOP ALL: 0 of 2 robots stopped; exo-01 reset; exo-02 STOP NOT CONFIRMED")
+    assert said(two).startswith("STOP ALL: 0 of 2 robots stopped; exo-01 reset; exo-02 STILL MOVING")
     assert two.desk.stations[1].stopping.text.endswith("is it running? Use the hardware stop")
 
 
@@ -90,7 +90,7 @@ def test_one_drive_that_does_not_confirm_is_named_with_its_robot(two: Bench) -> 
     two.commands[0].answer(ALL)
     two.commands[1].answer(Stopped({**ALL.drives, "left_knee": "unreachable"}, held=True))
     assert "11/12 drives confirmed in" in said(two)
-    assert "exo-02 STOP NOT CONFIRMED: left knee unreachable" in said(two)
+    assert "exo-02 STILL MOVING: left knee unreachable → STOP again" in said(two)
 
 
 def test_the_result_stays_until_the_last_robot_is_reset_or_removed(two: Bench) -> None:
@@ -127,3 +127,15 @@ def test_a_newer_stop_of_one_robot_counts_for_it(two: Bench) -> None:
     two.desk.stations[1].stop("again")
     two.commands[1].answer(ALL)
     assert said(two).startswith("STOP ALL: 2 of 2 robots stopped, 12/12 drives confirmed in")
+
+
+def test_drives_that_were_off_before_are_not_said_to_have_stopped_in_that_time(two: Bench) -> None:
+    """It said 12/12 confirmed in 1384 ms: six of them were off before."""
+    second = two.desk.stations[1]
+    off: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    second.take([telemetry([time.monotonic_ns()], off)])
+    two.desk.stop_all("test")
+    for commands in two.commands:
+        commands.answer(ALL)
+    timed(two.desk.stations[0], 84.0)
+    assert said(two).endswith("12/12 drives confirmed: 6 stopped in 84 ms, 6 were off before")

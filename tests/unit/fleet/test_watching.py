@@ -103,6 +103,7 @@ def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_mov
             "recorder",
             "the part “recorder” has not moved for more than 0.75 s; is this computer too busy?",
             False,
+            is_late=True,
         ),
     )
     go_on.set()
@@ -173,16 +174,27 @@ def test_a_dead_thread_of_a_collector_is_an_alarm_everywhere_and_works_again(
     until(lambda: collector.report().result(WAIT_S).recorder.recorded > before)
 
 
+LATE_S = "server_gui.core.threads.supervision.LATE_S"
+
+
+@pytest.mark.parametrize(
+    ("late_s", "told"),
+    [(WAIT_S, (Tone.WARNING, "Recording is late")), (0.0, (Tone.BAD, "RECORDING HAS STOPPED"))],
+)
 def test_a_recorder_that_stands_still_is_not_said_to_record(
-    collector: Collector, monkeypatch: pytest.MonkeyPatch
+    collector: Collector, monkeypatch: pytest.MonkeyPatch, late_s: float, told: tuple[Tone, str]
 ) -> None:
+    monkeypatch.setattr(LATE_S, late_s)
     is_patient(collector, but="recorder")
     go_on = threading.Event()
     monkeypatch.setattr(collector._spool, "append", lambda *_: go_on.wait(WAIT_S))
     until(lambda: troubles(collector))
     recording, status = said(collector)
     assert "ALARM  the part “recorder” has not moved" in status
-    assert (recording.said(None).tone, recording.said(None).text) == (Tone.BAD, "RECORDING HAS STOPPED")
+    assert (recording.said(None).tone, recording.said(None).text) == told
+    if late_s:
+        assert "recording is late: this computer is busy" in [news.text for news in recording._news.items]
+        assert [one.alarm.what for one in recording.alarms.active] == ["this computer is busy"]
     monkeypatch.undo()
     go_on.set()
     until(lambda: not troubles(collector))

@@ -53,7 +53,7 @@ def test_a_trial_is_applied_at_once_and_reverts_when_its_time_is_over(writer: Cl
     until(lambda: trials(writer) == [], "ended")
     error = writer.refused("parameter.confirm", write=written["write"])
     assert error.kind == "unknown_name"
-    assert "its time was over" in str(error)
+    assert "time ran out" in str(error)
 
 
 def test_what_is_on_trial_is_described(writer: Client) -> None:

@@ -65,7 +65,7 @@ def test_a_look_that_does_not_know_it_ends_nothing_until_it_has_lasted() -> None
 
 def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> None:
     ((words, check),) = findings(looks(*[20.0] * 3, cpu_percent=97.0)[-1])
-    assert words.endswith("20 % of their PDOs are missing; the robot's computer is busy")
+    assert words.endswith("20 % of their PDOs are missing; the robot's computer is overloaded")
     assert "gwrms blame" in check
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=40.0)[-1])[0][0]
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=97.0, nodes=1)[-1])[0][0]
@@ -75,7 +75,7 @@ def test_a_node_that_sends_no_pdos_does_not_hide_that_the_computer_is_busy() -> 
     each = [replace(NODE, node_id=number, pdos_missing_percent=one) for number, one in ((1, 9.0), (2, 8.0))]
     without = replace(NODE, node_id=16, pdos_missing_percent=None)
     (bus,) = MissingPdos().take((replace(BUS, nodes=[*each, without]),), 0, 97.0)
-    assert "busy" in findings(bus)[0][0]
+    assert "overloaded" in findings(bus)[0][0]
 
 
 def test_the_cause_does_not_change_with_each_look() -> None:
@@ -87,7 +87,7 @@ def test_the_cause_does_not_change_with_each_look() -> None:
     )
     for second, percent in enumerate((97.0, 70.0, None, 95.0, 80.0)):
         (told,) = watched.take((bus,), second * 2 * SECOND_NS, percent)
-        assert "busy" in findings(told)[0][0], second
+        assert "overloaded" in findings(told)[0][0], second
     (told,) = watched.take((bus,), 40 * SECOND_NS, 60.0)
     assert "busy" not in findings(told)[0][0]
 

@@ -267,8 +267,7 @@ def test_where_no_room_can_be_made_recording_goes_on_with_an_alarm(
         assert [row[3] for row in rows(kept(spool)[0])] == [0, 1, 2, 3]
     [alarm] = alarms
     assert alarm.text == (
-        f"no room can be made in the spool {tmp_path}: Input/output error; "
-        "recording goes on as long as there is room"
+        f"no room can be made in the spool {tmp_path}: Input/output error; what was uploaded stays in it"
     )
 
 

@@ -1,0 +1,58 @@
+"""What a robot's drives do, as far as is known."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from gateway.client import ConnectionState
+from server_gui.core.alarms.marks import ENABLED
+from server_gui.core.follow.robot import Robot
+
+MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
+
+
+def moving_joints(robot: Robot) -> list[str]:
+    """Return joints whose drive is enabled, or that turn."""
+    words = state_words(robot)
+    return [
+        joint
+        for joint in robot.names("joint")
+        if words[joint] == ENABLED or abs(robot.values.get(f"{joint}.velocity") or 0.0) > MOVES
+    ]
+
+
+def drives_did(robot: Robot) -> str:
+    words = state_words(robot)
+    if not words:
+        return ""
+    if not is_live(robot):
+        return "what its drives do now is not known"
+    enabled = [joint for joint, word in words.items() if word == ENABLED]
+    if None in words.values():
+        return f"the state of {listed([joint for joint, word in words.items() if word is None])} is not known"
+    if enabled:
+        return f"{len(enabled)} of {len(words)} drives are enabled still"
+    states = dict.fromkeys(str(word) for word in words.values())
+    return f"no drive is enabled: {', '.join(_counted(words, state, len(states)) for state in states)}"
+
+
+def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
+    count = list(words.values()).count(state)
+    return f"all {count} drives in {state}" if states == 1 else f"{count} {state}"
+
+
+def device_of(robot: Robot, name: str) -> Mapping[str, Any]:
+    known = () if robot.description is None else robot.description.components
+    device = next((part.device for part in known if part.name == name), None)
+    return device if isinstance(device, dict) else {}
+
+
+def state_words(robot: Robot) -> dict[str, str | None]:
+    return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
+
+
+def is_live(robot: Robot) -> bool:
+    return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
+
+
+def listed(names: list[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)

@@ -1,0 +1,96 @@
+"""A STOP that is not confirmed: what is to be done before why, and whether the robot moves still."""
+
+import time
+
+import pytest
+
+from gateway.client import ConnectionState, NotConnected
+from gateway.wire.stop import Stopped
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.unconfirmed import remedy
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import Event, LinkChanged
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+
+ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    made = Bench(Desk())
+    made.add("exo-01").take([described(), walking(50), looked()])
+    return made
+
+
+def states(number: float, **others: float) -> Event:
+    """A row, just now, with every drive in this state but these."""
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {
+        f"{joint}.state": [others.get(joint, number)] for joint in JOINTS
+    }
+    return telemetry([now_ns], columns, now_ns)
+
+
+def _link_lost(bench: Bench) -> None:
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+
+
+def kinds(station: Station) -> list[Kind]:
+    return [one.alarm.kind for one in station.alarms.active]
+
+
+def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
+    _link_lost(bench)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    assert kinds(bench.station) == [Kind.NOT_STOPPED, Kind.NO_LINK]
+    assert "MOVING" not in bench.station.alarms.active[0].alarm.line
+    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
+    (alarm,) = (one.alarm for one in bench.station.alarms.active)
+    assert alarm.line.startswith("STILL MOVING: STOP again; the STOP before failed: there is no link")
+    assert alarm.did == "all 6 drives enabled"
+    assert bench.station.mark.word == "STILL MOVING"
+
+
+def test_what_is_to_be_done_stands_before_why_a_stop_is_not_confirmed(bench: Bench) -> None:
+    _link_lost(bench)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("nothing was sent; no gateway at 127.0.0.1:7420; is it running there?"))
+    alarm = bench.station.alarms.active[0].alarm
+    assert alarm.line == "STOP NOT CONFIRMED: use the hardware stop · no link, nothing was sent"
+    assert alarm.why == "no gateway at 127.0.0.1:7420; is it running there?"
+
+
+def test_where_only_a_controller_is_silent_the_drives_are_said_to_be_off_and_it_may_enable_them(
+    bench: Bench,
+) -> None:
+    at_rest: dict[str, list[float | None]] = {f"{joint}.velocity": [0.0] for joint in JOINTS}
+    bench.station.take([states(6.0), telemetry([time.monotonic_ns()], at_rest)])
+    bench.station.stop("test")
+    bench.first.answer(Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}))
+    (one,) = bench.station.alarms.active
+    said = "all 6 drives are off, the gait controller did not answer: it may enable them again"
+    assert one.alarm.line == f"STOP NOT CONFIRMED: {said}"
+    assert one.alarm.check.startswith("keep the hardware stop at hand, check gait")
+    assert remedy(bench.station.robot, bench.station.stopping)[0] == "keep the hardware stop at hand"
+    bench.station.take([states(4.0)])
+    assert bench.station.mark.word == "STILL MOVING"
+    bench.station.stop("again")
+    bench.first.answer(Stopped({**ALL.drives, "left_knee": "unconfirmed"}, held=True))
+    assert bench.station.stopping.silent == ()
+
+
+def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    bench.station.take([states(5.0, left_knee=4.0)])
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    bench.station.take([states(5.0)])
+    proofs = bench.station.stopping.proofs
+    assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
+    assert proofs["left_hip"].when == "already off"
