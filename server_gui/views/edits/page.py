@@ -162,7 +162,7 @@ class Edits(QWidget):
         """Return the list, and what else may be tried."""
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
         self.try_again = QPushButton(AGAIN)
-        self.try_again.setToolTip(AGAIN_TIP)
+        set_tip(self.try_again, AGAIN_TIP)
         self.try_again.clicked.connect(lambda: self.again.emit(self._to_try_again))
         self.try_again.hide()
         self.ab.setToolTip("Compare two values of a parameter, several times in random order")
