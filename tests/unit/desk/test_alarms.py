@@ -494,8 +494,3 @@ def test_how_long_a_heartbeat_is_missing_is_what_it_was_at_least(bench: Bench) -
     bench.station.take([looked(state="stale", problem=problem)])
     (one,) = bench.station.alarms.active
     assert one.alarm.what == "its heartbeat has been missing for more than 0.2 s"
-
-
-def test_a_store_that_is_away_comes_before_trouble_of_a_bus_and_after_danger() -> None:
-    ranks = [Alarm(kind, "", "", check="").rank for kind in (Kind.DANGER_ADVICE, Kind.UPLOAD, Kind.BUS)]
-    assert ranks == sorted(ranks)

@@ -82,3 +82,8 @@ def test_without_an_alarm_an_event_is_as_bad_as_the_table_says() -> None:
         (NewsKind.FAULT, Kind.FAULT),
     ):
         assert (NEWS[news].shape, NEWS[news].colour) == (TEXTS[kind].mark.shape, TEXTS[kind].mark.colour)
+
+
+def test_a_store_that_is_away_comes_before_trouble_of_a_bus_and_after_danger() -> None:
+    ranks = [Alarm(kind, "", "", check="").rank for kind in (Kind.DANGER_ADVICE, Kind.UPLOAD, Kind.BUS)]
+    assert ranks == sorted(ranks)
