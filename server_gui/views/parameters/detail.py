@@ -21,6 +21,7 @@ from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
+MOST_FACTS: Final = 3  # where there is the least room; the tip has all
 BAR_SHARE: Final = 9  # of the title's line, where the limits' bar stands in it
 SEVERAL: Final = "The same for other joints: one change, reviewed, written and reverted as a whole"
 
@@ -48,7 +49,7 @@ class Detail(Card):
         self._desk = desk
         self._name: str | None = None
         self._range: tuple[float, float] | None = None
-        self._is_short = False
+        self._is_short = self.is_low = False  # low: so little room that rows of the table need it more
         self.slider = CalmSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, STEPS)
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -130,6 +131,9 @@ class Detail(Card):
         self._several.setEnabled(info.component in station.robot.names("joint"))
         facts = _facts(station, info, unit, current)
         known, _, problem = facts.partition("\n")  # the more important first where it may be scrolled
+        if self.is_low:
+            known = "" if problem else " · ".join(known.split(" · ")[:MOST_FACTS])
+        set_tip(self._facts, f"{facts}\nStored: {RULE}")
         set_text(self._facts, "\n".join(filter(None, (problem, known))) if self._is_short else facts)
 
     def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:

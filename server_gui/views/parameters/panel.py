@@ -46,6 +46,7 @@ NOT_KNOWN: Final = "Whether drives are enabled is not known now."
 ACTS: Final = "Drives are enabled: it acts at once, on whoever stands in the robot."
 NEWS_S: Final = 10.0  # that something is as it should be, it is said in green
 NO_LINK: Final = "There is no link to the robot: nothing can be stored"
+NARROW: Final = 300  # wide, at text of 100 %: below that all of the card would take the rows of the table
 REVIEW_WIDE: Final = 95  # its button with a number of two digits, at text of 100 %
 STORING: Final = "Make a device keep its parameters without power; a separate step"
 
@@ -91,6 +92,7 @@ class ParametersPanel(QWidget):
 
     def refresh(self) -> None:
         """Show how it is now."""
+        self.detail.is_low = self._is_short and self.width() < self._theme.px(NARROW)
         for part in (self.control, self.file, self.tree, self.trial, self.detail):
             part.refresh()
         station = self._desk.selected
