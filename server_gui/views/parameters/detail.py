@@ -21,7 +21,7 @@ from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
-MOST_FACTS: Final = 3  # where there is the least room; the tip has all
+MOST_FACTS: Final = 2  # where there is the least room; the tip has all
 BAR_SHARE: Final = 9  # of the title's line, where the limits' bar stands in it
 SEVERAL: Final = "The same for other joints: one change, reviewed, written and reverted as a whole"
 
@@ -131,6 +131,7 @@ class Detail(Card):
         self._several.setEnabled(info.component in station.robot.names("joint"))
         facts = _facts(station, info, unit, current)
         known, _, problem = facts.partition("\n")  # the more important first where it may be scrolled
+        self.range.setVisible(not self.is_low)
         if self.is_low:
             known = "" if problem else " · ".join(known.split(" · ")[:MOST_FACTS])
         set_tip(self._facts, f"{facts}\nStored: {RULE}")
