@@ -78,7 +78,7 @@ class NewValue(QStyledItemDelegate):
             self.typed.emit(str(index.data(NAME_ROLE)), editor.text())
 
 
-LOW: Final = 60  # at text of 100 %: what is below it stays in sight, and where there is more room it grows
+LOW: Final = 90  # at text of 100 %: what is below it stays in sight, and where there is more room it grows
 
 
 class ParameterTree(QTreeView):
