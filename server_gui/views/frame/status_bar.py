@@ -110,7 +110,7 @@ class StatusBar(QStatusBar):
         known, is_full = self._rate(), station is not None and station.is_full()
         is_busy = is_full or (known is not None and known < SLOW_FPS)
         rate = "– fps" if known is None else f"{known:.0f} fps" if known >= 1.0 else "<1 fps"
-        self._window.say(*(*(f"{busy} · {rate}" for busy in FULL), FULL[-1]) if is_busy else (rate,))
+        self._window.say(*(*(f"{busy} · {rate}" for busy in FULL), f"▲ {rate}") if is_busy else (rate,))
         set_tone(self._window, "warn" if is_busy else "")
         set_tip(self._window, FRAMES_HINT)
         self.stop.say(*self._stop_words(station))
@@ -143,7 +143,8 @@ class StatusBar(QStatusBar):
         short = " · ".join(filter(None, (said.text.partition(" · ")[0], said.reason)))
         wordings: tuple[str, ...] = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
         if NOTHING in said.text.split(" · "):  # why it is no good, before that it goes on
-            wordings = (*wordings[:2], f"{short}: {NOTHING}", NOTHING)
+            brief = " · ".join(filter(None, (NOTHING, said.reason)))
+            wordings = (*wordings[:2], f"{short}: {NOTHING}", brief)
         if first == LATE:
             wordings = (LATE.capitalize(), said.text)
         self.recording.say(*dict.fromkeys(wordings))

@@ -138,7 +138,7 @@ class Overview(QWidget):
             card.setParent(self)  # else it would be shown as a window of its own
         self._columns, self._is_plots, self._is_low = 0, False, False
         self._ordered_for: object = None
-        self._looks = 0  # at this size
+        self._looks, self._was_first = 0, True  # at this size
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -165,7 +165,8 @@ class Overview(QWidget):
             is_low, pages = self._is_too_low(), self._fitting_pages()
             if is_low is not self._is_low or pages != self._pages:
                 self._is_low, self._pages = is_low, pages
-                self._page = next((page for page in pages if page == self._page), pages[0])
+                is_kept = is_first is self._was_first and self._page in pages
+                self._page, self._was_first = self._page if is_kept else pages[0], is_first
                 self._arrange(self._fitting)
 
     def _is_too_low(self) -> bool:

@@ -354,6 +354,8 @@ class Player(QWidget):
         if self.alarms.told and not self._was_wrong:
             self._was_wrong = self.overview.is_numbers_first = True
             self._make_room()
+            self.overview.read_now()  # its joints come first from now on
+            self.overview.refresh()
         is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
         self.alarms.setVisible(self._was_wrong and not is_in_the_way)
 
