@@ -162,12 +162,22 @@ class Overview(QWidget):
         looks = 1 if room != self._ordered_for else self._looks
         if looks <= LOOKS:
             self._ordered_for, self._looks = room, looks + 1
+            self._reserve_lines()
             is_low, pages = self._is_too_low(), self._fitting_pages()
             if is_low is not self._is_low or pages != self._pages:
                 self._is_low, self._pages = is_low, pages
                 is_kept = is_first is self._was_first and self._page in pages
                 self._page, self._was_first = self._page if is_kept else pages[0], is_first
                 self._arrange(self._fitting)
+
+    def _reserve_lines(self) -> None:
+        """Keep room for all lines below the ring where the plots have theirs all the same; else for one."""
+        seen, needs = self.parentWidget(), self._needs()
+        self.status_lines.reserve(STATUS_LINES)
+        more = self._status.minimumSizeHint().height() - needs[Section.WEARER]
+        gaps = len(needs) * self._grid.verticalSpacing()
+        if seen is None or seen.height() - self._around - sum(needs.values()) - gaps < more:
+            self.status_lines.reserve(1)
 
     def _is_too_low(self) -> bool:
         """Return whether something has to be scrolled to, now or with a few lines more."""

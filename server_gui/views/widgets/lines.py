@@ -28,15 +28,20 @@ class Lines(QWidget):
         for row, (icon, label) in enumerate(self._rows):
             grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
             grid.addWidget(label, row, 1)
-        theme.changed.connect(self._reserve)
-        self._reserve()
+        self._reserved = most
+        theme.changed.connect(self._reserve_anew)
+        self.reserve(most)
 
-    def _reserve(self) -> None:
-        """Keep the room of all lines: what stands above and below is not moved as they come and go."""
-        grid = self._grid
+    def _reserve_anew(self) -> None:
+        self.reserve(self._reserved)
+
+    def reserve(self, count: int) -> None:
+        """Keep the room of so many lines: what stands above and below is not moved as they come and go."""
+        self._reserved = count
         label = self._rows[0][1].sizeHint().height()
         for row in range(len(self._rows)):
-            grid.setRowMinimumHeight(row, label + 1)
+            self._grid.setRowMinimumHeight(row, label + 1 if row < count else 0)
+        self.updateGeometry()
 
     @property
     def texts(self) -> list[str]:
