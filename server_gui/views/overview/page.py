@@ -4,7 +4,6 @@ Where not all of it is seen at once, the joints come before the pictures: their 
 Where it has less room still, its sections are on pages: fewer things, and whole.
 """
 
-from collections.abc import Collection, Sequence
 from typing import Final
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
@@ -49,7 +48,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.colour_bar import ColourBar
 from server_gui.views.widgets.figure import Pose, StickFigure
-from server_gui.views.widgets.gait_ring import GaitRing
+from server_gui.views.widgets.gait_ring import GaitRing, meaning
 from server_gui.views.widgets.lines import Lines
 from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.pressure_map import PressureMap
@@ -376,8 +375,8 @@ class Overview(QWidget):
         if slow:
             sources = {one.value.replace("_", " ") for one in derived.sources.values() if one is not None}
             model = any(modelled.values())
-            meaning = _meaning(sources, instead_of_insoles(station), model=model)
-            self._status.set_note(*(meaning if live else old_text(station)))
+            told = meaning(sources, instead_of_insoles(station), model=model)
+            self._status.set_note(*(told if live else old_text(station)))
             self.status_lines.show_lines(most_needed(list(lines(station))))
             self.learned.refresh(station)
 
@@ -479,16 +478,6 @@ def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
         return f"{side.upper()}  {load.problem or 'not known'}", f"{side[0].upper()}  –"
     said = f"{force.text(load.force)} {force.symbol}"
     return f"{side.upper()}  {said}", f"{side[0].upper()}  {said}"
-
-
-def _meaning(sources: Collection[str], instead: Sequence[str], *, model: bool) -> tuple[str, ...]:
-    """Return what the rings mean, the fullest wording first; what stands `instead` of an insole stays."""
-    rings, short = "outer ring left, inner right", "outer left, inner right"
-    told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
-    told += ["dot: model"] if model else []
-    if instead:
-        return " · ".join([rings, *told]), f"{short} · {', '.join(instead)}", ", ".join(instead), instead[0]
-    return tuple(dict.fromkeys((" · ".join([rings, *told]), rings, short, "outer L, inner R")))
 
 
 def _age(station: Station) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ A line across a ring is what the steps that were seen say, a dot in it what a mo
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -248,3 +248,13 @@ def _widest(text: str) -> str:
 
 def _percent(phase: LegPhase | None) -> str:
     return "not known" if phase is None else f"{phase.percent:.0f} % of its stride, {phase.phase}"
+
+
+def meaning(sources: Collection[str], instead: Sequence[str], *, model: bool) -> tuple[str, ...]:
+    """Return what the rings mean, the fullest wording first; what stands `instead` of an insole stays."""
+    rings, short = "outer ring left, inner right", "outer left, inner right"
+    told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
+    told += ["dot: model"] if model else []
+    if instead:
+        return " · ".join([rings, *told]), f"{short} · {', '.join(instead)}", ", ".join(instead), instead[0]
+    return tuple(dict.fromkeys((" · ".join([rings, *told]), rings, short, "outer L, inner R")))
