@@ -62,7 +62,7 @@ def edits(bench: Bench) -> None:
     """What was tried is listed, with what it did to the walk, or that this is not known yet."""
     hand = bench.hand
     hand.click("Edits")
-    hand.sees("step_length", "gait cycle", within_s=AGAIN_S)
+    hand.sees("step length", "gait cycle", within_s=AGAIN_S)
     hand.keep("edits")
     hand.click("Overview")
 
