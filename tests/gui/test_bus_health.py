@@ -63,10 +63,10 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     show(view, bench, BUS)
     assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
     assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
-    knee = ["2", "left knee", "", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
+    knee = ["2", "left knee", "○ not known", "89 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
     assert row(view, 0) == knee, "nothing new comes from the robot"
-    assert row(view, 1)[:6] == ["–", "SYNC", "", "", "10 %", "100"]
-    assert row(view, 2)[:6] == ["–", "gateway or filtered", "", "", "1 %", "10"]
+    assert row(view, 1)[:5] == ["–", "SYNC", "", "10 %", "100"]
+    assert row(view, 2)[:5] == ["–", "gateway or filtered", "", "1 %", "10"]
     assert not view.said.isVisible()
 
 
@@ -92,6 +92,17 @@ def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     bench.station.take([walking(1)])
     show(view, bench, BUS)
     assert view.cards[0]._icon.accessibleName() == "ok"
+
+
+def test_identifiers_stand_beside_what_is_no_node_where_there_is_room(
+    view: BusHealthView, bench: Bench
+) -> None:
+    filled = replace(BUS, talks=[TalkInfo("other", None, 5000.0, [0x7FF]), *BUS.talks], frames_per_s=6010.0)
+    show(view, bench, filled)
+    assert row(view, 0)[1] == "no known node 0x7FF"
+    view.resize(300, 600)
+    show(view, bench, filled)
+    assert row(view, 0)[1] == "no known node"
 
 
 def test_the_load_of_the_last_minutes_is_drawn_with_its_peak(view: BusHealthView, bench: Bench) -> None:

@@ -16,7 +16,7 @@ from gateway.wire.bus import CLOSED, BusInfo
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.core.alarms.severity import bus_level, bus_mark
-from server_gui.core.desk.bus_page import Row, rows, told_kinds
+from server_gui.core.desk.bus_page import UNKNOWN, Row, rows, told_kinds
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import (
     ACTIVE,
@@ -39,6 +39,7 @@ from server_gui.views.widgets.plot import Curve, css
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
+MOST: Final = 100.0  # percent: what is counted above it is the count's own error
 LEAST_LOAD: Final = 20.0  # percent: less than that is no hill
 LEVELS: Final = {
     BusHealthLevel.GOOD: Mark("disc", "good", "ok"),
@@ -49,7 +50,6 @@ LEVELS: Final = {
 TITLES: Final = (
     "Node",
     "Sender",
-    "Identifiers",
     "State",
     "Share",
     "Frames/s",
@@ -58,9 +58,9 @@ TITLES: Final = (
     "Unanswered",
     "PDOs missing",
 )
-NODE, SENDER, IDS, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
+NODE, SENDER, STATE, SHARE, FRAMES, SENDS, TRIPS, UNANSWERED, MISSING = range(len(TITLES))
 # Left out in this order where there is less room, before a name is shortened.
-SPARE: Final = (SENDS, TRIPS, UNANSWERED, IDS, SHARE, MISSING, NODE, FRAMES)
+SPARE: Final = (SENDS, TRIPS, UNANSWERED, SHARE, MISSING, NODE, FRAMES)
 NUMBERS: Final = (SHARE, FRAMES, TRIPS, UNANSWERED, MISSING)
 SENDERS_HINT: Final = (
     "Each node has the frames that it sends itself. A PDO or request to a node is listed by its kind: "
@@ -133,8 +133,9 @@ class BusCard(Card):
     def _show_past(self, past: Floats, *, live: bool) -> None:
         times, load = past[:, 0], past[:, 1]
         known = load[~np.isnan(load)]
-        self._past.set_note(f"peak {known.max():.0f} %" if len(known) else "")
-        self._past.show_rows(self._past, times, [Curve("load", "accent")], [load], live=live)
+        self._past.set_note(f"peak {min(known.max(), MOST):.0f} %" if len(known) else "")
+        held = np.minimum(load, MOST)
+        self._past.show_rows(self._past, times, [Curve("load", "accent")], [held], live=live)
 
     def _counted(self, bus: BusInfo) -> list[tuple[str, str, str]]:
         text, wrong = css(self._theme, "text"), css(self._theme, "warn")
@@ -190,6 +191,7 @@ class BusCard(Card):
     def _say_states(self, *, brief: bool) -> None:
         for place, row in enumerate(self._rows[: self.table.rowCount()]):
             self._set(place, STATE, _state(row, brief=brief), row.colour)
+            self._set(place, SENDER, _sender(row, brief=brief), row.colour)
 
     def _set(self, row: int, column: int, text: str, colour: str) -> None:
         item = self.table.item(row, column)
@@ -225,6 +227,11 @@ def _colour_of(load_percent: float) -> str:
     return "bad" if load_percent >= FULL_PERCENT else "warn" if load_percent >= BUSY_PERCENT else "accent"
 
 
+def _sender(row: Row, *, brief: bool = False) -> str:
+    """Name who sends; of what is no node the identifiers, too."""
+    return row.name if brief or row.node != UNKNOWN else f"{row.name} {row.ids}".rstrip()
+
+
 def _state(row: Row, *, brief: bool = False) -> str:
     if row.mark is None:
         return ""
@@ -235,8 +242,7 @@ def _state(row: Row, *, brief: bool = False) -> str:
 def _texts(row: Row) -> tuple[str, ...]:
     return (
         row.node,
-        row.name,
-        row.ids,
+        _sender(row),
         _state(row),
         row.share,
         row.frames,
