@@ -103,8 +103,9 @@ class Hand:
 
     def turn_to(self, section: str) -> None:
         """Show this section of the overview, where it is on a page of its own."""
-        named = (one for one in self.names() if one.lstrip("■▲✕ ").startswith(section))
-        button = max(named, key=len, default=None)  # what is wrong there, or else is on that page, stands behind
+        named = {one: one.lstrip("■▲✕ ").partition(":")[0] for one in self.names()}  # behind: what is wrong
+        wanted = (section, "Wearer and plots")
+        button = next((one for one, page in named.items() if page in wanted), None)
         if button is not None:
             self.click(button, exactly=True)
 
