@@ -29,6 +29,18 @@ def header(bench: Bench, theme: Theme) -> Iterator[Header]:
     destroy(made)
 
 
+def test_without_a_robot_stop_is_of_the_one_that_is_commissioned_as_its_key_is(
+    header: Header, bench: Bench
+) -> None:
+    bench.desk.selected = None
+    bench.draw(header)
+    assert not header.stop.isEnabled()
+    header.commissioned = lambda: "exo-01"
+    bench.draw(header)
+    assert header.stop.isEnabled()
+    assert "exo-01" in header.stop.accessibleName()
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
 def test_chips_never_overlap(bench: Bench, theme: Theme, header: Header, scale: float) -> None:
     theme.set(scale=scale)

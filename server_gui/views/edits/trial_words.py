@@ -63,6 +63,12 @@ def so_far(station: Station) -> tuple[str, ...]:
     )
 
 
+def is_judged(station: Station) -> bool:
+    """Return whether it is known what the trial did: before that no button is the one that is meant."""
+    edit = station.trial_evidence
+    return edit is not None and edit.evidence.word is not Word.FEW
+
+
 def _not_enough(evidence: Evidence) -> str:
     """Return that it is too early, or what keeps strides from being counted."""
     before, after = evidence.cycles_before, evidence.cycles_after

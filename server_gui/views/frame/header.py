@@ -67,6 +67,7 @@ class Header(QWidget):
         self._row.addWidget(self.reset_button)
         self.menu = menu
         self._row.addWidget(menu)
+        self.commissioned: Callable[[], str] = lambda: ""  # the robot that is: its STOP is ours, too
         self.stop = StopButton()
         self.stop.stopped.connect(self.stopped)
         self._row.addWidget(self.stop)
@@ -104,8 +105,9 @@ class Header(QWidget):
         self._fit()
 
     def _refresh_stop(self, station: Station | None) -> None:
-        self.stop.name(None if station is None else station.title)
-        self.stop.setEnabled(station is not None)
+        name = self.commissioned() if station is None else station.title
+        self.stop.name(name or None)
+        self.stop.setEnabled(bool(name))  # as the key does it
         stopping = None if station is None else station.stopping
         self.reset_button.setVisible(stopping is not None and stopping.held)
         why_not = "" if station is None else station.refused(ROBOT_RESET)

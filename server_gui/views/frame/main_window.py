@@ -154,6 +154,7 @@ class MainWindow(QMainWindow):
         self._is_closing = self._is_ending = False
         if commissioning is not None:
             desk.commissions = lambda: commissioning.wish is not None
+            self.header.commissioned = lambda: commissioning.name if commissioning.runs else ""
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)

@@ -4,7 +4,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton
 
 from server_gui.core.models.changes import ModelChange
 from server_gui.core.models.models import Models
-from server_gui.views.widgets.card import Card, set_text, set_tone
+from server_gui.views.widgets.card import Card, set_primary, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 
 
@@ -50,9 +50,8 @@ class Confirm(Card):
             set_text(self.warning, f"▲ {change.lost}")
             self.warning.setVisible(bool(change.lost))
             self.yes.setText(_does(change))
-            for button, is_usual in ((self.yes, not change.lost), (self.no, bool(change.lost))):
-                button.setObjectName("primary" if is_usual else "")
-                button.style().polish(button)
+            set_primary(self.yes, not change.lost)
+            set_primary(self.no, bool(change.lost))
             self.why.clear()
             self.no.setFocus()
 

@@ -13,10 +13,11 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, is_judged, so_far, why_no_ab, wordings
 from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
 from server_gui.views.predictions import AS_KNOWN, STOPPED, activity, is_last_held, no_data
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_primary
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
@@ -94,7 +95,6 @@ class NowLine(QFrame):
         self.trial = Fact(theme, "Trial")
         self.trial.setParent(self)  # also while it has no place, so that it is no window of its own
         self.keep, self.take_back = QPushButton("Keep"), QPushButton("Take back")
-        self.keep.setObjectName("primary")
         self.keep.setToolTip("Keep the values on trial")
         self.take_back.setToolTip("Return to the values from before")
         self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
@@ -145,6 +145,7 @@ class NowLine(QFrame):
         trial = None if station is None else station.writing.trial
         if station is not None and trial is not None:
             self._show_trial(station, trial)
+            set_primary(self.keep, is_judged(station))
         self._fit(on_trial=trial is not None)
         if station is None:
             return

@@ -5,8 +5,8 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab
-from server_gui.views.widgets.card import set_text
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, is_judged, so_far, why_no_ab
+from server_gui.views.widgets.card import set_primary, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 
@@ -37,7 +37,7 @@ class TrialBar(QFrame):
         self._bar.setTextVisible(False)
         self._bar.setAccessibleName("Time left of the trial")
         keep, back = QPushButton("Keep it"), QPushButton("Take it back now")
-        keep.setObjectName("primary")
+        self._keep = keep
         keep.clicked.connect(self.keep)
         back.clicked.connect(self.take_back)
         self.ab = QPushButton("A/B …")
@@ -71,6 +71,7 @@ class TrialBar(QFrame):
         whose = "" if station is self._desk.selected else f"{station.title}: "
         said = ", ".join(changes(station, trial, self._desk.shown.units))
         seen = so_far(station)[0]
+        set_primary(self._keep, is_judged(station))
         set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}; {seen}")
 
     def _whose(self, *, shown: bool) -> Station | None:

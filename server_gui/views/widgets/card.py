@@ -52,6 +52,14 @@ def set_text(label: QLabel, text: str) -> None:
         label.setText(text)
 
 
+def set_primary(button: QWidget, on: bool) -> None:
+    """Make a button the one that is meant, or one of several, only where it is another."""
+    name = "primary" if on else ""
+    if button.objectName() != name:
+        button.setObjectName(name)
+        button.style().polish(button)
+
+
 def set_tone(label: QWidget, tone: str) -> None:
     """Change the colour of a label or a frame, by its name in the style sheet, only where it is another."""
     if label.property("tone") != tone:
