@@ -209,10 +209,11 @@ def store_gone(bench: Bench) -> None:
     hand.keep("store-gone")
     for title, key, words in (
         ("models", "alt+m", "Train a model"),
-        ("recordings", "alt+c", "others may be in"),
+        ("recordings", "alt+c", "Mark now"),
     ):
         hand.key(key)
         hand.sees(words)
+        hand.sees("there is no store at", within_s=AGAIN_S)
         hand.keep(f"store-gone-{title}")
     bench.store.unlink()
     away.rename(bench.store)
