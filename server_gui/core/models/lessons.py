@@ -9,7 +9,7 @@ from gateway.amounts import counted
 from ml.errors import UnusableData
 from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store, StoreError
-from ml.store.labels import INSTANTS, REGRESSION, holding, wearers
+from ml.store.labels import INSTANTS, REGRESSION, LabelSource, holding, wearers
 from ml.store.sessions import Session, sessions
 from ml.store.tables import LABELS
 from ml.store.translation import translated
@@ -86,16 +86,14 @@ def _lessons(known: Iterable[Session], rows: Iterable[Mapping[str, Any]], task: 
     found: dict[tuple[str, str], _Gathered] = {}
     for session in known:
         said = by_session.get((session.robot, session.session), [])
+        if not any(_matters(row, task) for row in said):
+            continue
         people = wearers((row["label"] for row in said), session.wearer)
         why_not = SEVERAL if len(people) > 1 else ""
         if any(row["label"] == REGRESSION for row in said):
             why_not = ONLY_JUDGES
         nobody = (session.session, [session.session])
         who, spelled = next(iter(people.items())) if len(people) == 1 else nobody
-        gathered = _Gathered()
-        _gather(gathered, said, task)
-        if not gathered.spans and not gathered.instants:
-            continue
         whole = found.setdefault((who, why_not), _Gathered(spelled[0], len(people) == 1))
         whole.sessions += 1
         _gather(whole, said, task)
@@ -113,15 +111,22 @@ def _lessons(known: Iterable[Session], rows: Iterable[Mapping[str, Any]], task: 
     )
 
 
-def _gather(into: _Gathered, said: Iterable[Mapping[str, Any]], task: str) -> None:
+def _matters(row: Mapping[str, Any], task: str) -> bool:
+    """Return whether the task learns from it: from a label of the kind, and not by a model's own word."""
     fold = TASKS[task].fold
+    return row["label"] in (fold or INSTANTS) and row["source"] != LabelSource.PSEUDO.value
+
+
+def _gather(into: _Gathered, said: Iterable[Mapping[str, Any]], task: str) -> None:
     for row in said:
         label = row["label"]
-        if not fold and label in INSTANTS:
+        if not _matters(row, task):
+            continue
+        if label in INSTANTS:
             into.instants += 1
-        elif label in fold:
-            span = tuple(row[name].replace(tzinfo=UTC).timestamp() for name in ("utc", "ended"))
-            into.spans.setdefault(label, []).append(span)
+        else:
+            begin, end = (row[name].replace(tzinfo=UTC).timestamp() for name in ("utc", "ended"))
+            into.spans.setdefault(label, []).append((begin, end))
 
 
 def _union_s(spans: list[tuple[float, float]]) -> float:

@@ -84,6 +84,6 @@ def _told(table: str, lost: Loss) -> str:
     return rows + of + span
 
 
-def told_time(utc_ns: int, timespec: str = "microseconds") -> str:
-    """Return a time for people, in UTC, as fine as asked for (`datetime.isoformat`)."""
-    return datetime.fromtimestamp(utc_ns / 1e9, UTC).replace(tzinfo=None).isoformat(" ", timespec) + "Z"
+def told_time(utc_ns: int) -> str:
+    """Return a time for people, in UTC."""
+    return f"{datetime.fromtimestamp(utc_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S.%f}Z"

@@ -11,15 +11,10 @@ from tests.unit.training.walkers import Made, day, put
 PERSON = LabelSource.PERSON
 
 
-def of(tmp_path: Path, *days: Made) -> dict[str, Lesson]:
-    found = lessons(filled(tmp_path, *days), "activity")
+def of(url: str, spool: Path, *days: Made) -> dict[str, Lesson]:
+    put(url, spool, days)
+    found = lessons(url, "activity")
     return {each.name: each for each in found.each}
-
-
-def filled(tmp_path: Path, *days: Made) -> str:
-    url = (tmp_path / "store").as_uri()
-    put(url, tmp_path / "spool", days)
-    return url
 
 
 def made(session: str, *said: tuple[float, float, str, LabelSource], wearer: str = "") -> Made:
@@ -27,9 +22,12 @@ def made(session: str, *said: tuple[float, float, str, LabelSource], wearer: str
     return Made(session, one.values, said, wearer=wearer)
 
 
-def test_one_wearer_however_spelled_is_one_and_what_two_have_labelled_counts_once(tmp_path: Path) -> None:
+def test_one_wearer_however_spelled_is_one_and_what_two_have_labelled_counts_once(
+    folder_url: str, tmp_path: Path
+) -> None:
     found = of(
-        tmp_path,
+        folder_url,
+        tmp_path / "spool",
         made("mon", (0.0, 4.0, "walk", PERSON), (2.0, 6.0, "walk", LabelSource.SIMULATOR), wearer="Ada L"),
         made("tue", (0.0, 3.0, "stand", PERSON), wearer="ada l"),
         made("wed", (0.0, 2.0, "stand", PERSON)),
@@ -40,9 +38,10 @@ def test_one_wearer_however_spelled_is_one_and_what_two_have_labelled_counts_onc
     assert not found["wed"].is_named
 
 
-def test_what_nothing_is_learned_from_says_why(tmp_path: Path) -> None:
+def test_what_nothing_is_learned_from_says_why(folder_url: str, tmp_path: Path) -> None:
     found = of(
-        tmp_path,
+        folder_url,
+        tmp_path / "spool",
         made("mon", (0.0, 4.0, "walk", PERSON), (0.0, 9.0, "wearer Bob", PERSON), wearer="Ada"),
         made("tue", (0.0, 3.0, "stand", PERSON), (0.0, 9.0, REGRESSION, PERSON)),
         made("wed", (0.0, 3.0, "lying on the floor", PERSON)),
@@ -50,14 +49,25 @@ def test_what_nothing_is_learned_from_says_why(tmp_path: Path) -> None:
     assert {each.said for each in found.values()} == {SEVERAL, ONLY_JUDGES}
 
 
-def test_who_judges_is_who_would_where_nobody_is_chosen(tmp_path: Path) -> None:
-    url = filled(tmp_path, *(day(f"s{number}", number, each_s=5.0) for number in range(4)))
-    found = lessons(url, "activity")
+def test_what_only_a_model_has_said_teaches_nothing(folder_url: str, tmp_path: Path) -> None:
+    found = of(
+        folder_url,
+        tmp_path / "spool",
+        made("mon", (0.0, 4.0, "walk", LabelSource.PSEUDO), wearer="Ada"),
+        made("tue", (0.0, 3.0, "stand", PERSON), (3.0, 9.0, "walk", LabelSource.PSEUDO), wearer="Bob"),
+    )
+    assert {name: one.said for name, one in found.items()} == {"Bob": "stand 0:03"}
+
+
+def test_who_judges_is_who_would_where_nobody_is_chosen(folder_url: str, tmp_path: Path) -> None:
+    days = [day(f"s{number}", number, each_s=5.0) for number in range(4)]
+    put(folder_url, tmp_path / "spool", days)
+    found = lessons(folder_url, "activity")
     assert not found.problem
     assert len(found.usual) == 1
     assert found.usual <= {each.name for each in found.each}
-    assert lessons(url, "gait_phase").problem.startswith("wearers or sessions with labels: none; ")
-    assert lessons(url, "activity", "another").each == ()
+    assert lessons(folder_url, "gait_phase").problem.startswith("wearers or sessions with labels: none; ")
+    assert lessons(folder_url, "activity", "another").each == ()
 
 
 @pytest.mark.parametrize("url", ["file:///nowhere/at/all", "s4://nobody"])
