@@ -3,25 +3,24 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from ml.errors import UnusableModel
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
 from ml.store.labels import Label
 from ml.store.sessions import Session
 from ml.training.recorded import Recorded
 from server_gui.core.archive.recorded_predictions import PastPrediction, said
-from server_gui.core.prediction.scoring import Decisions, compared, counted, quality
+from server_gui.core.models.names import task_name
+from server_gui.core.prediction.scoring import Decisions, compared, counted, proven_classes, quality
 from server_gui.core.prediction.state import Quality
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 
 Span = tuple[int, int]  # from, up to before: UTC in ns
 Found = dict[str, Quality]  # by task
-BY_TASK: Final = {"activity": "Activity", "gait_phase": "Gait phase"}
 
 
 class LabelHits:
@@ -61,7 +60,7 @@ def found(settings: ServerSettings, session: Session, span: Span, labels: Sequen
     past = [one for one in said(settings, session, *span) if one.prediction.task in TASKS]
     registry, hits = Registry(settings.store.url), dict[str, Counter[tuple[str, str]]]()
     for (task, model), rows in _by_model(past):
-        classes = _classes(registry, model, session.session)
+        classes = proven_classes(registry, model, session.session)
         stamps_ns = np.array([one.prediction.stamp_ns for one in rows], np.int64)
         utc_ns = np.array([one.utc_ns for one in rows], np.int64)
         decisions = Decisions(
@@ -76,7 +75,7 @@ def found(settings: ServerSettings, session: Session, span: Span, labels: Sequen
 
 def told(hits: Found) -> str:
     """Return it in words; empty where no prediction was of a labelled time."""
-    return " · ".join(f"{BY_TASK.get(task, task)} predicted then: {one.text}" for task, one in hits.items())
+    return " · ".join(f"{task_name(task)} predicted then: {one.text}" for task, one in hits.items())
 
 
 def _by_model(past: Sequence[PastPrediction]) -> Iterator[tuple[tuple[str, str], list[PastPrediction]]]:
@@ -84,12 +83,3 @@ def _by_model(past: Sequence[PastPrediction]) -> Iterator[tuple[tuple[str, str],
     for one in past:
         by_model.setdefault((one.prediction.task, one.prediction.model), []).append(one)
     yield from by_model.items()
-
-
-def _classes(registry: Registry, model: str, session: str) -> Sequence[str]:
-    """Return those that the model knows; none where this session can prove nothing of it."""
-    try:
-        card = registry.card(model)
-    except UnusableModel:
-        return ()
-    return () if session in card.learned else card.classes

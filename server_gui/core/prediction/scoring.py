@@ -7,7 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from ml.errors import UnusableModel
 from ml.features.windows import Samples
+from ml.registry.registry import Registry
 from ml.robot.task import ABNORMAL, SIDES, STRIDE, UNKNOWN, Task
 from ml.serving.grid import Stamps
 from ml.store.labels import Label, LabelSource
@@ -69,6 +71,15 @@ def _phases(true: Samples, sources: Names, said: Decisions) -> tuple[Names, Sequ
     off = ~(apart <= WITHIN).all(axis=1)
     was = np.where(known & steps, STRIDE, np.where(known & stride, STILL, NOBODY))
     return was, np.where(stride & steps & off, OFF, said.labels).tolist()
+
+
+def proven_classes(registry: Registry, model: str, session: str) -> Sequence[str]:
+    """Return the classes that a model knows; none where this session can prove nothing of it."""
+    try:
+        card = registry.card(model)
+    except UnusableModel:
+        return ()  # it is gone
+    return () if session in card.learned else card.classes
 
 
 def counted(was: Names, said: Sequence[str]) -> Counts:

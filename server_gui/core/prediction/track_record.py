@@ -12,7 +12,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
 
-from ml.errors import UnusableModel
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store
@@ -21,7 +20,7 @@ from ml.store.labels import ACTIVITIES, INSTANTS, Label, holding
 from ml.store.tables import LABELS, PREDICTIONS, Table
 from ml.store.translation import translated
 from ml.training.recorded import Recorded
-from server_gui.core.prediction.scoring import Counts, Decisions, compared, counted, quality
+from server_gui.core.prediction.scoring import Counts, Decisions, compared, counted, proven_classes, quality
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures
 
 Key = tuple[str, str, str]  # robot, task, model
@@ -119,7 +118,7 @@ class TrackRecord:
         found = {}
         for one in rows.group_by(["task", "model"]).aggregate([]).to_pylist():
             task, model = one["task"], one["model"]
-            if classes := self._classes(model, session):
+            if classes := proven_classes(self._registry, model, session):
                 said = _decisions(rows.filter((_field("task") == task) & (_field("model") == model)))
                 both = compared(stretch.labels, clock, TASKS[task], classes, said)
                 found[robot, task, model] = counted(*both)
@@ -137,14 +136,6 @@ class TrackRecord:
         with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
             rows = self._store.dataset(PREDICTIONS.name, version).to_table(columns=_COLUMNS, filter=wanted)
         return rows.sort_by("stamp_ns")
-
-    def _classes(self, model: str, session: str) -> Sequence[str]:
-        """Return those that the model knows; none where this session can prove nothing of it."""
-        try:
-            card = self._registry.card(model)
-        except UnusableModel:
-            return ()  # it is gone
-        return () if session in card.learned else card.classes
 
 
 def _decisions(rows: pa.Table) -> Decisions:
