@@ -38,7 +38,7 @@ class Row:
     trips: str
     unanswered: str
     missing: str
-    ids: str = ""
+    ids: str = ""  # of what is not one of the robot's nodes: its identifiers
 
     @property
     def colour(self) -> str:
@@ -194,8 +194,7 @@ def _row(
     percent = told_percent(node) or node.pdos_missing_percent  # what is told of it stands in its row, too
     is_known = percent is not None and not is_silent and (percent > 0.0 or talk is not None)
     missing = f"{percent:.1f} %" if is_known else UNKNOWN
-    ids = "" if talk is None else talk.ids
-    return Row(str(node_id), names, mark, share, frames, sends, trips, str(node.sdo_timeouts), missing, ids)
+    return Row(str(node_id), names, mark, share, frames, sends, trips, str(node.sdo_timeouts), missing)
 
 
 def _nameless(name: str, share: str, frames: str, node: str, sends: str = "", ids: str = "") -> Row:

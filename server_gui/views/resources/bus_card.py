@@ -16,7 +16,7 @@ from gateway.wire.bus import CLOSED, BusInfo
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.core.alarms.severity import bus_level, bus_mark
-from server_gui.core.desk.bus_page import UNKNOWN, Row, rows, told_kinds
+from server_gui.core.desk.bus_page import Row, rows, told_kinds
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import (
     ACTIVE,
@@ -228,8 +228,8 @@ def _colour_of(load_percent: float) -> str:
 
 
 def _sender(row: Row, *, brief: bool = False) -> str:
-    """Name who sends; of what is no node the identifiers, too."""
-    return row.name if brief or row.node != UNKNOWN else f"{row.name} {row.ids}".rstrip()
+    """Name who sends; of what is not one of the robot's nodes the identifiers, too."""
+    return row.name if brief else f"{row.name} {row.ids}".rstrip()
 
 
 def _state(row: Row, *, brief: bool = False) -> str:
