@@ -3,6 +3,7 @@
 import argparse
 import fnmatch
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -71,8 +72,9 @@ def add_robot(made: argparse.ArgumentParser) -> None:
 def again(arguments: argparse.Namespace, command: str) -> str:
     """Return how to give another command to the same robot."""
     robot: Address = arguments.robot
-    named_usual = robot == USUAL and not robot.called
-    return f"gwrms {command}" if named_usual else f"gwrms {command} --robot {robot.called or robot}"
+    if robot == USUAL and not robot.called:
+        return f"gwrms {command}"
+    return f"gwrms {command} --robot {shlex.quote(robot.called or str(robot))}"
 
 
 def spoken(arguments: argparse.Namespace) -> str:

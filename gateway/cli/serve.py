@@ -99,8 +99,11 @@ def main(arguments: Sequence[str]) -> int:
             raise
         if not valid:
             return _refuse(handed, error)
+        try:
+            robot = _as_told(config.load_text(options.config, valid), options)
+        except config.ConfigError:  # it was changed at the moment when it was kept
+            return _refuse(handed, error)
         log.error("%s", error)  # a stop is carried out all the same
-        robot = _as_told(config.load_text(options.config, valid), options)
         refusal = framing.refuse(framing.ErrorKind.UNAVAILABLE, str(error))
     share_heap()
     sockets = _listeners(robot, handed)
