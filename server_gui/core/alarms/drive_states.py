@@ -21,6 +21,7 @@ def moving_joints(robot: Robot) -> list[str]:
 
 
 def drives_did(robot: Robot) -> str:
+    """Return in words what the drives do; empty of a robot without any."""
     words = state_words(robot)
     if not words:
         return ""
@@ -41,18 +42,22 @@ def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
 
 
 def device_of(robot: Robot, name: str) -> Mapping[str, Any]:
+    """Return what the robot tells of a component's device; nothing where it tells nothing."""
     known = () if robot.description is None else robot.description.components
     device = next((part.device for part in known if part.name == name), None)
     return device if isinstance(device, dict) else {}
 
 
 def state_words(robot: Robot) -> dict[str, str | None]:
+    """Return the state of each joint's drive; None where it is not known."""
     return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
 
 
 def is_live(robot: Robot) -> bool:
+    """Return whether what is known of it is of now."""
     return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
 
 
 def listed(names: list[str]) -> str:
+    """Return names for people."""
     return ", ".join(name.replace("_", " ") for name in names)

@@ -160,6 +160,7 @@ class Recording:
         now = {trouble.thread: _told_as(trouble) for trouble in threads}
         for thread, text in now.items():
             if told.get(thread) != text:
+                self._since_s.pop(told.get(thread, ""), None)
                 self._begun(text)
         for thread in told.keys() - now.keys():
             self._over(told[thread])
