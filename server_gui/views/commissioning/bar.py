@@ -9,7 +9,7 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.messages import DRIVES_ONLY
 from server_gui.core.commissioning.stages import GO_ON, Stage
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text, set_tone
+from server_gui.views.widgets.card import set_primary, set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -89,10 +89,7 @@ class Bar(QWidget):
 
     def _lead_on(self, *, is_first: bool) -> None:
         """Let nothing lead on as loudly as STOP stops, but at first."""
-        name = "primary" if is_first else ""
-        if self._start.objectName() != name:
-            self._start.setObjectName(name)
-            self._start.style().polish(self._start)
+        set_primary(self._start, is_first)
 
     def _restyle(self) -> None:
         self.stop.setFont(self._theme.text_font(1.2, bold=True))

@@ -19,7 +19,7 @@ from server_gui.core.tuning.edits import ReviewedEdit
 from server_gui.views.parameters.change_blocks import ChangeBlocks, mark_of
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.card import set_primary, set_text
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -172,11 +172,7 @@ class Review(QWidget):
     def _lead(self, leading: QPushButton) -> None:
         """Make this button the one that is meant: where somebody may stand in it, the trial."""
         for button in (self.try_it, self.write_it):
-            name = "primary" if button is leading else ""
-            if button.objectName() != name:
-                button.setObjectName(name)
-                button.style().unpolish(button)
-                button.style().polish(button)
+            set_primary(button, button is leading)
 
     def _enable(self, on: bool) -> None:
         self.try_it.setEnabled(on)
