@@ -30,6 +30,7 @@ from gateway.wire import framing
 log = logging.getLogger(__name__)
 
 VALID = "GWRMS_VALID_FILE"  # in the environment of a gateway at rest: the robot's file as it was valid last
+STOP_ALONE = "only a stop is carried out until that is mended and the gateway is started again"
 MOST_KEPT = 100_000  # bytes of it; Linux takes 128 KiB
 
 _DESCRIPTION = """\
@@ -104,7 +105,7 @@ def main(arguments: Sequence[str]) -> int:
         except config.ConfigError:  # it was changed at the moment when it was kept
             return _refuse(handed, error)
         log.error("%s", error)  # a stop is carried out all the same
-        refusal = framing.refuse(framing.ErrorKind.UNAVAILABLE, str(error))
+        refusal = framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{error}\n{STOP_ALONE}")
     share_heap()
     sockets = _listeners(robot, handed)
     by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()

@@ -68,6 +68,7 @@ class Connection(asyncio.Protocol):
         self._on_notification = on_notification
         self._transport: asyncio.Transport | None = None
         self._waiting: dict[int, tuple[asyncio.Future[msgspec.Raw], OnResult | None]] = {}
+        self._refusal = ""  # the last answer, where that was one
         self._ids = itertools.count(1)
         self._lines = framing.LineSplitter(framing.ANSWER_LIMIT)
         self._decode = msgspec.json.Decoder(Incoming).decode
@@ -187,6 +188,8 @@ class Connection(asyncio.Protocol):
                 "; if it has keys, it is to be paired with first (gwrms pair); on its own computer root, the "
                 "account that it runs as and users whom access.toml names need no key, at its Unix socket"
             )
+        elif self._refusal:  # which was the last that it said
+            why += f": {self._refusal}"
         self._end(LinkLost(f"{self.address} closed the link{why}"))
 
     # --- matching
@@ -209,8 +212,9 @@ class Connection(asyncio.Protocol):
         answer, on_result = self._waiting.get(message.id or 0, (None, None))
         if answer is None or answer.done():
             return  # its caller gave up
+        self._refusal = "" if message.error is None else _said(message.error)
         if message.error is not None:
-            answer.set_exception(RemoteError(message.error.code, _said(message.error), message.error.data))
+            answer.set_exception(RemoteError(message.error.code, self._refusal, message.error.data))
             return
         answer.set_result(message.result)
         if on_result is not None:

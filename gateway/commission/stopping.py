@@ -26,6 +26,7 @@ WITHIN_S = 1.5  # for a drive to confirm it
 MOST_AXES = 8  # of a node (CiA 402-2)
 NO_DRIVE = "the robot's file has no drive"
 OTHERS = "draft and robot's file do not tell of every drive: others may be on the bus"
+UNREADABLE = "cannot be read, so no drive is known for sure; all 127 node ids were asked to stop"
 EVERY_NODE = range(1, 128)
 
 
@@ -106,7 +107,10 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     known = drafted | (written or set())
     found = _stopped(bench, known, every=draft.path.exists())
     is_open = (not drafted and draft.path.exists()) or written is None
-    return Stopped.of({str(axis): one for axis, one in found.items()}, OTHERS if is_open and known else "")
+    problem = OTHERS if is_open and known else ""
+    if written is None and not known:
+        problem = f"{draft.file} {UNREADABLE}"
+    return Stopped.of({str(axis): one for axis, one in found.items()}, problem)
 
 
 def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:

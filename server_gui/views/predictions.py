@@ -10,6 +10,7 @@ from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import HELD, IN_FAULT, NONE_ENABLED, STOPPING
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.desk.confidence import NOT_SEEN, Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
@@ -187,8 +188,12 @@ def doing(station: Station) -> tuple[str, ...]:
     if not station.is_live:
         return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
-    if line.mark.word == STOPPED and station.stopping.held:  # as the line above says
-        return tuple(dict.fromkeys((count, count.replace(" of ", "/"))))
+    if line.mark.word == STOPPED and station.stopping.held:
+        worst = station.alarms.worst
+        said: tuple[str, ...] = (count, count.replace(" of ", "/"))
+        if worst is not None and worst.kind not in {Kind.STOPPED, *UNSTOPPED}:  # else the line above says so
+            said = (*(f"STOPPED · {one}" for one in said), "STOPPED")
+        return tuple(dict.fromkeys(said))
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
     short = line.short_text

@@ -15,6 +15,7 @@ import pytest
 from gateway.access import changes
 from gateway.access.folder import AccessFolder
 from gateway.certificates import der_of
+from gateway.cli.serve import STOP_ALONE
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.process.loop import Loop
@@ -95,7 +96,8 @@ def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running,
     until(lambda: processes.rests(running.pid), "it rests")
     file.write_text("[robot]\n", encoding="utf-8")
     with Client(address) as client:
-        assert str(client.refused("robot.describe")) == f"{file}: [robot] name: is missing"
+        said = f"{file}: [robot] name: is missing\n{STOP_ALONE}"
+        assert str(client.refused("robot.describe")) == said
     file.write_text(processes.RESTS_SOON, encoding="utf-8")
     until(lambda: processes.rests(running.pid), "it rests again")
     with Client(address) as client:
