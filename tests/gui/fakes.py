@@ -1,5 +1,7 @@
 """What the window's tests share: frames that are drawn, views that are taken apart."""
 
+from typing import Protocol
+
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout, QWidget
 
@@ -21,13 +23,19 @@ OVERVIEW = 0  # its page, which reads anew only when the window does
 class Bench(desk.Bench):
     """A desk that is drawn."""
 
-    def draw(self, window: "MainWindow | Around") -> None:
+    def draw(self, window: "MainWindow | Refreshed") -> None:
         """Frames enough for everything to have been refreshed, and Qt's own events."""
         if isinstance(window, MainWindow):
             draw_frames(window)
         else:
             window.refresh()
         QApplication.processEvents()
+
+
+class Refreshed(Protocol):
+    """A part of the window that is drawn when it is told."""
+
+    def refresh(self) -> None: ...
 
 
 class Around(QWidget):
