@@ -67,7 +67,7 @@ class Intake:
         def change() -> None:
             for one in self._acceptors:
                 (one.start if on else one.end)()
-            self._loop.post(then)
+            self._front.post(lambda: self._loop.post(then))  # behind those who are being admitted
 
         self._front.post(change)
 

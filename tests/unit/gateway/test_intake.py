@@ -6,9 +6,11 @@ import itertools
 import socket
 import sys
 import termios
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import pytest
@@ -323,6 +325,35 @@ def test_who_costs_something_takes_turns_again(turned: Turned) -> None:
     turned.spent = [rate_limit.COSTLY_NS // 2, 0]
     turned.says(CLOCK % 1)
     assert not turned.inlet._is_known
+
+
+def test_who_is_admitted_while_nobody_is_accepted_any_more_comes_before_that_is_said(
+    turned: Turned,
+) -> None:
+    """A gateway that went to rest at that moment lost the client."""
+    loop, said = Loop(), list[str]()
+    thread = intake.Intake(loop, {}, lambda _inlet: said.append("opened"), lambda: None)
+    accepting, goes_on = threading.Event(), threading.Event()
+    thread.start()
+    thread._front.post(partial(_wait, accepting, goes_on))
+    assert accepting.wait(WAIT_S)
+
+    def closed() -> None:
+        said.append("closed")
+        loop.stop()
+
+    thread.listen(on=False, then=closed)
+    thread.admit(turned.accepted, "10.0.0.2:1", ANYBODY)
+    goes_on.set()
+    loop.run()
+    thread.end()
+    loop.close()
+    assert said == ["opened", "closed"]
+
+
+def _wait(begun: threading.Event, goes_on: threading.Event) -> None:
+    begun.set()
+    goes_on.wait(WAIT_S)
 
 
 def test_lines_that_could_hold_no_stop_are_not_looked_into() -> None:
