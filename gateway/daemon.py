@@ -34,6 +34,8 @@ log = logging.getLogger(__name__)
 MUCH_BYTES = 64 * 1024  # that a client has sent or got
 TIDY_S = 5.0  # after it has gone
 WATCH_S = 0.2  # between looks whether those who are connected are still known
+REREAD_S = 0.2  # after who was refused for the robot's file: the next one is to find it mended
+STOP_ALONE = "only a stop is carried out until that is mended and the gateway is started again"
 
 _REVOKED = framing.refuse(
     framing.ErrorKind.NOT_ALLOWED, "what you may do on this robot has changed, so this connection ends"
@@ -53,13 +55,12 @@ class Daemon:
         *,
         ends_idle: bool = False,
         rested_without_keys: bool = False,
-        refusal: framing.RpcError | None = None,
     ) -> None:
         """`classic` is where the paper's own exchange is served, `local` a Unix socket.
 
         With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`. Where
-        it has `rested_without_keys`, it is served without them again. With a `refusal`, everything but a
-        stop is answered with that.
+        it has `rested_without_keys`, it is served without them again. Where the robot's file is `outdated`,
+        everything but a stop is answered with that, and `classic` is not served.
 
         Raises:
             UnsafeListener: one of these sockets must not be served.
@@ -78,7 +79,7 @@ class Daemon:
         self._told = False
         self._tidying = False
         self._ends_idle = ends_idle
-        self._refusal = refusal
+        self._refusal = _only_a_stop(config.outdated) if config.outdated else None
         self._idle: Timer | None = None
         self._sockets = [listener] if local is None else [listener, local]
         folder = AccessFolder(config.access)
@@ -97,7 +98,12 @@ class Daemon:
         if classic is not None:
             check_classic(classic)
             self._classic = ClassicPort(
-                self._loop, classic, self._service.use_resource, self._service.registry.leave, self._left
+                self._loop,
+                classic,
+                self._service.use_resource,
+                self._service.registry.leave,
+                self._left,
+                is_served=self._refusal is None,
             )
 
     @property
@@ -238,7 +244,9 @@ class Daemon:
         if self._idle is not None:
             self._idle.cancel()
         if self._ends_idle:
-            self._idle = self._loop.call_later(self._config.gateway.linger_s, self._lingered)
+            linger_s = self._config.gateway.linger_s
+            wait_s = linger_s if self._refusal is None else min(linger_s, REREAD_S)
+            self._idle = self._loop.call_later(wait_s, self._lingered)
 
     def _lingered(self) -> None:
         self._idle = None
@@ -276,6 +284,10 @@ class Daemon:
         for session in self._places.taken:
             session.close()
         self._service.registry.close(self._loop.stop)
+
+
+def _only_a_stop(why: str) -> framing.RpcError:
+    return framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{why}\n{STOP_ALONE}")
 
 
 @contextlib.contextmanager

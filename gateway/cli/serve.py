@@ -29,9 +29,9 @@ from gateway.wire import framing
 
 log = logging.getLogger(__name__)
 
-VALID = "GWRMS_VALID_FILE"  # in the environment of a gateway at rest: the robot's file as it was valid last
-STOP_ALONE = "only a stop is carried out until that is mended and the gateway is started again"
-MOST_KEPT = 100_000  # bytes of it; Linux takes 128 KiB
+MOST_KEPT = 100_000  # bytes of the robot's file as it was valid last; Linux takes 128 KiB
+NOT_KEPT = "%s is larger than %d bytes: should it be broken while the gateway rests, stops are refused, too"
+_VALID = "GWRMS_VALID_FILE"  # where it is in the environment while the gateway rests
 
 _DESCRIPTION = """\
 Serves one robot over TCP: joints over CANopen, insoles and IMU over serial ports, and
@@ -91,21 +91,17 @@ def main(arguments: Sequence[str]) -> int:
     except SystemExit as ended:  # argparse has said why
         return ended.code if isinstance(ended.code, int) else 2
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    handed, valid, refusal = inherited(os.environ), os.environ.pop(VALID, ""), None
+    handed, kept = inherited(os.environ), os.environ.pop(_VALID, "")
     try:
-        robot = _robot(options, tell=handed is None or not handed.woken)
-        valid = _text(options.config)
+        robot, kept = _robot(options, tell=handed is None or not handed.woken)
     except config.ConfigError as error:
         if handed is None:
             raise
-        if not valid:
-            return _refuse(handed, error)
-        try:
-            robot = _as_told(config.load_text(options.config, valid), options)
-        except config.ConfigError:  # it was changed at the moment when it was kept
-            return _refuse(handed, error)
+        outdated = _robot_of(kept, options, str(error))
+        if outdated is None:
+            return _refuse(handed, error, kept)
         log.error("%s", error)  # a stop is carried out all the same
-        refusal = framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{error}\n{STOP_ALONE}")
+        robot = outdated
     share_heap()
     sockets = _listeners(robot, handed)
     by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()
@@ -118,13 +114,12 @@ def main(arguments: Sequence[str]) -> int:
             local=sockets.local,
             ends_idle=idle,
             rested_without_keys=sockets.without_keys,
-            refusal=refusal,
         )
     except (UnsafeListener, KeyProblem) as error:
         if handed is None:
             sockets.close()
             raise
-        return _refuse(handed, error, valid)
+        return _refuse(handed, error, kept)
     if watched is not None:
         daemon.repeat(watched / 2, lambda: systemd_notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
@@ -132,27 +127,34 @@ def main(arguments: Sequence[str]) -> int:
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         if by_hand and not daemon.told:
-            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys), {VALID: valid})
+            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys), {_VALID: kept})
     return 0
 
 
-def _text(file: Path) -> str:
-    """Return the robot's file, as far as it can be kept: where it is broken meanwhile, a stop needs it."""
-    with contextlib.suppress(OSError, ValueError):
-        text = file.read_text(encoding="utf-8")
-        return text if len(text.encode()) <= MOST_KEPT else ""
-    return ""
-
-
-def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
-    """Return the robot of the file.
+def _robot(options: argparse.Namespace, *, tell: bool) -> tuple[config.RobotConfig, str]:
+    """Return the robot of the file, and its text to be kept at rest: a stop needs it where it breaks then.
 
     What is likely wrong with it, or files that it names, is logged on `tell`.
     """
-    robot, warnings = config.load_with_warnings(options.config)
+    data = config.read(options.config)
+    robot, warnings = config.load_bytes(options.config, data)
+    is_kept = len(data) <= MOST_KEPT
     for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
-    return _as_told(robot, options)
+    if tell and not is_kept:
+        log.warning(NOT_KEPT, options.config, MOST_KEPT)
+    return _as_told(robot, options), os.fsdecode(data) if is_kept else ""
+
+
+def _robot_of(kept: str, options: argparse.Namespace, outdated: str) -> config.RobotConfig | None:
+    """Return the robot of a kept text, and why it is `outdated`; None where there is none."""
+    if not kept:
+        return None
+    try:
+        robot, _warnings = config.load_bytes(options.config, os.fsencode(kept))
+    except config.ConfigError:  # of another version of the program
+        return None
+    return replace(_as_told(robot, options), outdated=outdated)
 
 
 def _as_told(robot: config.RobotConfig, options: argparse.Namespace) -> config.RobotConfig:
@@ -210,7 +212,7 @@ def _local(robot: config.RobotConfig) -> socket.socket | None:
     return None
 
 
-def _refuse(handed: Listeners, error: Exception, valid: str = "") -> int:
+def _refuse(handed: Listeners, error: Exception, kept: str) -> int:
     """Tell everybody who has come from this computer why they are not served; where it was woken, rest again.
 
     Whoever comes from elsewhere is told nothing: nobody knows who that is.
@@ -226,7 +228,7 @@ def _refuse(handed: Listeners, error: Exception, valid: str = "") -> int:
                     if listener.family == socket.AF_UNIX or is_loopback(listener.getsockname()):
                         connection.send(line)
     if handed.woken:
-        rest(handed, {VALID: valid})
+        rest(handed, {_VALID: kept})
     return 1
 
 

@@ -48,6 +48,6 @@ def _verdict(stopped: Stopped) -> int:
         warn("stop", "NOT CONFIRMED: the robot has no drive that can be stopped")
     elif missing:
         warn("stop", f"NOT CONFIRMED by {', '.join(missing)}: take it that they still move")
-    if stopped.problem is not None:
-        warn("stop", stopped.problem)
-    return 0 if stopped.drives and not missing else 1
+    for said in filter(None, (stopped.outdated, stopped.problem)):
+        warn("stop", said)
+    return 0 if stopped.drives and not missing and stopped.outdated is None else 1

@@ -28,7 +28,8 @@ from gateway.config.robot import (
 from gateway.config.stop import StopSettings
 from gateway.tables.decoding import Decoding
 from gateway.tables.finding import Finding, in_order, lines, mistakes, unknown
-from gateway.tables.reading import Unreadable, parse, read
+from gateway.tables.reading import Unreadable, content, parse
+from gateway.tables.reading import read as read_tables
 
 Table = Mapping[str, Any]
 
@@ -71,29 +72,37 @@ def load(path: Path) -> RobotConfig:
         ConfigError: it is not there, is no TOML, or says something that cannot work.
 
     """
-    return load_with_warnings(path)[0]
+    return load_bytes(path, read(path))[0]
 
 
-def load_with_warnings(path: Path) -> tuple[RobotConfig, list[Finding]]:
-    """Return the same, with what is likely wrong; raises `ConfigError`."""
-    found = examine(path)
+def read(path: Path) -> bytes:
+    """Return what stands in the file; raises `ConfigError`."""
+    try:
+        return content(path)
+    except Unreadable as error:
+        raise ConfigError(lines(path, [error.finding])) from error
+
+
+def load_bytes(path: Path, data: bytes) -> tuple[RobotConfig, list[Finding]]:
+    """Return the robot of what stands in the file, or stood there, and what is likely wrong with it.
+
+    Raises:
+        ConfigError: it is no TOML, or says something that cannot work.
+
+    """
+    try:
+        found = examined(path, parse(data))
+    except Unreadable as error:
+        raise ConfigError(lines(path, [error.finding])) from error
     if found.config is None:
         raise ConfigError(lines(path, mistakes(found.findings)))
     return found.config, found.findings
 
 
-def load_text(path: Path, text: str) -> RobotConfig:
-    """Return the robot of a text that the file once was, and that was valid; raises `ConfigError`."""
-    found = examined(path, parse(text.encode()))
-    if found.config is None:
-        raise ConfigError(lines(path, mistakes(found.findings)))
-    return found.config
-
-
 def examine(path: Path) -> Examined:
     """Read the robot's file; whatever is wrong with it is told, not only the first thing."""
     try:
-        document = read(path)
+        document = read_tables(path)
     except Unreadable as error:
         return Examined(None, [error.finding])
     return examined(path, document)

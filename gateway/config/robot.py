@@ -131,6 +131,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     # By table, the names of those that could not be read: others may speak of them while the file is checked.
     lost: Mapping[str, frozenset[str]] = {}
     digest: str = ""  # of all that the file says, whatever its comments and order
+    outdated: str = ""  # why the file cannot be used now, where this is how it was valid last
 
     def names(self, *tables: str) -> list[str]:
         """Return the names in tables of these kinds, including unreadable ones."""

@@ -85,8 +85,14 @@ class ClassicPort:
         use: "Callable[[Hashable], Future[M]]",
         leave: Callable[[Hashable], None],
         left: Callable[[], None],
+        *,
+        is_served: bool = True,
     ) -> None:
-        """`use` gives the module, running until its user leaves; `left` is told when a client has gone."""
+        """`use` gives the module, running until its user leaves; `left` is told when a client has gone.
+
+        Where it is not served, whoever comes is sent away.
+        """
+        self._is_served = is_served
         self._loop = loop
         self._listener = listener
         self._next_piece: Callable[[_Exchange], Future[bytes]] = lambda exchange: then(
@@ -119,7 +125,7 @@ class ClassicPort:
     def _opened(self, connection: socket.socket, address: Any) -> None:
         source = str(address[0])
         full = len(self._exchanges) >= MOST_EXCHANGES and source not in self._exchanges
-        if full or len(self._calls) >= MOST_CALLS:
+        if not self._is_served or full or len(self._calls) >= MOST_CALLS:
             connection.close()
             return
         call = _Call(self._loop, connection, lambda: self._answer(source), self._ended)

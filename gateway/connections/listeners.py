@@ -4,6 +4,7 @@ They are handed over as systemd does it (sd_listen_fds(3)): from descriptor 3 on
 the environment. A gateway that nobody needs hands them to `resting.py` in the same way, and gets them back.
 """
 
+import contextlib
 import fcntl
 import os
 import re
@@ -144,8 +145,9 @@ def _adopted(descriptor: int) -> socket.socket:
 def rest(listeners: Listeners, kept: Mapping[str, str] = MappingProxyType({})) -> None:
     """Become a small process that waits at the sockets, and this program again when somebody comes.
 
-    That finds what is `kept` in its environment. Never returns; what is not inheritable is closed. Signals
-    are to be blocked before: what comes meanwhile is then met by the one who waits.
+    That finds what is `kept` in its environment, as far as there is room. Never returns; what is not
+    inheritable is closed. Signals are to be blocked before: what comes meanwhile is then met by the one
+    who waits.
 
     Raises:
         OSError: the interpreter cannot be started.
@@ -158,7 +160,6 @@ def rest(listeners: Listeners, kept: Mapping[str, str] = MappingProxyType({})) -
     environ = {
         "MALLOC_ARENA_MAX": "1",  # of glibc: the threads of so small a process need no memory of their own
         **os.environ,
-        **kept,
         _NUMBER: str(len(spare)),
         _PROCESS: str(os.getpid()),
         _NAMES: ":".join(listeners.named),
@@ -166,4 +167,8 @@ def rest(listeners: Listeners, kept: Mapping[str, str] = MappingProxyType({})) -
     }
     ourselves = [sys.executable, *sys.orig_argv[1:]]
     sys.stdout.flush()
-    os.execve(sys.executable, [sys.executable, "-I", "-S", resting.__file__, *ourselves], environ)
+    command = [sys.executable, "-I", "-S", resting.__file__, *ourselves]
+    if kept:
+        with contextlib.suppress(OSError):  # too much of it, where the stack is small: then without
+            os.execve(sys.executable, command, {**environ, **kept})
+    os.execve(sys.executable, command, environ)

@@ -44,6 +44,11 @@ def read(file: Path) -> dict[str, Any]:
         Unreadable: there are none; it says at which line, and what was likely meant. Reading ends there.
 
     """
+    return parse(content(file))
+
+
+def content(file: Path) -> bytes:
+    """Return what stands in it; raises `Unreadable` where it cannot be read, or is no UTF-8."""
     try:
         data = file.read_bytes()
     except OSError as error:
@@ -51,7 +56,7 @@ def read(file: Path) -> dict[str, Any]:
     for mark, remedy in _ENCODINGS:
         if data.startswith(mark):
             raise Unreadable(Finding("", "", remedy))
-    return parse(data)
+    return data
 
 
 def parse(data: bytes) -> dict[str, Any]:

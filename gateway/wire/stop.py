@@ -24,6 +24,7 @@ class Stopped(Struct, frozen=True):
     controllers: dict[str, StopOutcome] = {}  # of `[[stop.controller]]`
     fallbacks: dict[str, str] = {}  # drive → what was carried out beyond the quick stop, in words
     problem: str | None = None  # why the stop is not held beyond this gateway
+    outdated: str | None = None  # why drives may be missing here, and move: the robot's file cannot be used
 
 
 class Reset(Struct, frozen=True):

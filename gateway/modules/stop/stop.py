@@ -9,7 +9,8 @@ from concurrent.futures import Future
 from typing import Any
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.config.stop import Fallback, StopSettings
+from gateway.config.robot import RobotConfig
+from gateway.config.stop import Fallback
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
 from gateway.modules.stop.target import Report, StopTarget
@@ -22,6 +23,7 @@ log = logging.getLogger(__name__)
 
 WhenReady = Callable[[str], "Future[None]"]
 Kept = Future[str | None]  # why it is not held beyond this gateway
+OUTDATED = "{}\nstopped were the drives of that file as it was valid last: take it that any other still moves"
 
 
 class StopAnswers:
@@ -33,7 +35,7 @@ class StopAnswers:
     def __init__(
         self,
         loop: Loop,
-        settings: StopSettings,
+        config: RobotConfig,
         stoppers: Mapping[str, Stopper],
         absent: Iterable[str],
         controllers: Controllers,
@@ -41,7 +43,8 @@ class StopAnswers:
         tell: Tell,
     ) -> None:
         self._loop = loop
-        self._settings = settings
+        self._settings = config.stop
+        self._outdated = OUTDATED.format(config.outdated) if config.outdated else None
         self._stoppers = stoppers
         self._controllers = controllers
         self._targets: Mapping[str, StopTarget] = {**stoppers, **controllers.targets}
@@ -97,6 +100,7 @@ class StopAnswers:
             controllers={name: one for name, one in said.items() if name in controllers},
             fallbacks={name: one.fallback for name, one in reports.items() if one.fallback is not None},
             problem=kept.result() if kept.done() else "nobody knows yet whether it outlives this gateway",
+            outdated=self._outdated,
         )
 
 

@@ -112,7 +112,7 @@ class StopControl:
         self._rewrite_due = 0.0
         self._answers = StopAnswers(
             loop,
-            config.stop,
+            config,
             stoppers,
             self._absent,
             self._controllers,

@@ -96,7 +96,9 @@ def _said(answer: "concurrent.futures.Future[Stopped]") -> str:
         return "failed: this program ended before the robot had answered"
     if (error := answer.exception()) is not None:
         return f"failed: {error}"
-    return ", ".join(f"{name} {state}" for name, state in answer.result().drives.items())
+    stopped = answer.result()
+    drives = ", ".join(f"{name} {state}" for name, state in stopped.drives.items())
+    return drives if stopped.outdated is None else f"{drives}, not confirmed: {stopped.outdated}"
 
 
 def record(session: str, news: Predicted) -> Record:

@@ -152,6 +152,8 @@ class StopProgress:
         missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
         if stopped.drives and len(self._confirmed) == len(stopped.drives):
             self.silent = tuple(name for name, said in stopped.controllers.items() if said != "confirmed")
+        if stopped.outdated is not None:
+            missing.append(stopped.outdated)
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:

@@ -60,3 +60,12 @@ def test_a_controller_is_not_listed_as_a_drive(robot: FakeRobot, capsys: pytest.
     answer["controllers"] = {"gait": "confirmed"}
     assert main(["stop", "--robot", robot.address]) == 0
     assert capsys.readouterr().out.startswith("DRIVE OR CONTROLLER ")
+
+
+def test_a_stop_by_an_outdated_file_is_not_confirmed(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = {"drives": dict.fromkeys(JOINTS, "confirmed"), "held": True, "outdated": "robot.toml: is broken"}
+    robot.overrides["robot.stop"] = lambda params: answer
+    assert main(["stop", "--robot", robot.address]) == 1
+    assert capsys.readouterr().err == "gwrms stop: robot.toml: is broken\n"

@@ -1,5 +1,6 @@
 """A STOP as the window knows it: by its answer, the drives' rows, the link and the robot's journal."""
 
+import msgspec
 import pytest
 
 from gateway.client import ClockOffset
@@ -227,3 +228,11 @@ def test_a_stop_of_somebody_else_that_was_reset_is_not_held_though_ours_is_not_c
     stopping.read([at(1, "stop", SENT_NS - 1_000_000_000)], BOOT)
     stopping.read([at(2, "reset", SENT_NS + 8_000_000_000, held=False)], BOOT)
     assert stopping.stage == (StopState.NOT_CONFIRMED, False)
+
+
+def test_a_stop_by_an_outdated_file_is_not_confirmed() -> None:
+    """A drive that the file names by now would have walked on beside a green word."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), msgspec.structs.replace(ALL, outdated="robot.toml: is broken"))
+    assert stopping.state is StopState.NOT_CONFIRMED
+    assert stopping.why == "robot.toml: is broken"

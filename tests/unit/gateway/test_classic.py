@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from gateway.config import ConfigError
@@ -25,8 +26,9 @@ Call = Callable[..., bytes]
 
 
 @contextlib.contextmanager
-def daemon(folder: Path) -> Iterator[Daemon]:
+def daemon(folder: Path, outdated: str = "") -> Iterator[Daemon]:
     robot = config(folder, HEAD.replace("port = 0", "port = 0\nclassic_port = 0"))
+    robot = msgspec.structs.replace(robot, outdated=outdated)
     made = Daemon(robot, listen("127.0.0.1", 0), classic=listen("127.0.0.1", 0))
     ready = threading.Event()
     thread = threading.Thread(target=made.run, args=(ready.set,), name="daemon")
@@ -37,6 +39,15 @@ def daemon(folder: Path) -> Iterator[Daemon]:
     finally:
         made.end()
         thread.join(WAIT_S)
+
+
+def test_while_the_robots_file_cannot_be_used_nobody_is_served(tmp_path: Path) -> None:
+    with daemon(tmp_path, outdated="robot.toml: is broken") as made:
+        assert made.classic_port is not None
+        come = socket.create_connection(("127.0.0.1", made.classic_port), WAIT_S)
+        with come, contextlib.suppress(ConnectionResetError):
+            come.sendall(b"x")
+            assert come.recv(1) == b""
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from drivers.joint.quick_stop import StopOutcome
-from gateway.config.stop import StopSettings
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.first_stop import FirstStop
 from gateway.modules.stop.stop import StopAnswers
@@ -210,14 +209,14 @@ def test_what_has_confirmed_is_not_kept_waiting_for_until_its_node_has_booted(
     [(StopOutcome.UNREACHABLE, 1), (StopOutcome.UNCONFIRMED, 1), (StopOutcome.CONFIRMED, 0)],
 )
 def test_what_could_not_be_reached_yet_is_asked_once_more_when_it_can_be(
-    first: StopOutcome, asked: int
+    first: StopOutcome, asked: int, tmp_path: Path
 ) -> None:
     loop, knee = Loop(), FakeStopper()
     ready: Future[None] = Future()
     controllers = cast("Controllers", SimpleNamespace(targets={}, absent={}, names=frozenset()))
     stoppers = cast("dict[str, Stopper]", {"knee": knee})
     answers = StopAnswers(
-        loop, StopSettings(), stoppers, (), controllers, lambda _name: ready, lambda _name, _text: None
+        loop, config(tmp_path), stoppers, (), controllers, lambda _name: ready, lambda _name, _text: None
     )
     answer = answers.follow({"knee": done(Report(first))}, None)
     answer.add_done_callback(lambda _answer: loop.stop())

@@ -1,6 +1,8 @@
 """A gateway that nobody needs becomes a small process that waits, and is back for whoever comes."""
 
 import contextlib
+import os
+import re
 import signal
 import socket
 import subprocess
@@ -10,14 +12,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from gateway.access import changes
 from gateway.access.folder import AccessFolder
 from gateway.certificates import der_of
-from gateway.cli.serve import STOP_ALONE
 from gateway.connections.listeners import listen
-from gateway.daemon import Daemon
+from gateway.daemon import STOP_ALONE, Daemon
+from gateway.modules.stop.stop import OUTDATED
 from gateway.process.loop import Loop
 from gateway.registry import Registry
 from gateway.wire.role import Role
@@ -117,7 +120,21 @@ def test_a_stop_is_carried_out_though_the_file_was_broken_meanwhile(running: Run
             assert client.refused("robot.describe").kind == "unavailable"
     until(lambda: processes.rests(running.pid), "it rests again, and still knows the file that was valid")
     with Client(address) as client:
-        assert client.call("robot.stop")["held"] is True
+        stopped = client.call("robot.stop")
+    assert stopped["held"] is True
+    assert stopped["outdated"] == OUTDATED.format(f"{file}: cannot be read: No such file or directory")
+
+
+def test_the_file_is_kept_as_it_is_written_whatever_the_locale(tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(processes.RESTS_SOON + "# Köhler's knee, 5 °\n", encoding="utf-8")
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    with processes.process(*processes.GATEWAY, str(file), environ={**os.environ, **ascii_only}) as running:
+        address = processes.address(running)
+        until(lambda: processes.rests(running.pid), "it rests")
+        file.write_text("[robot]\n", encoding="utf-8")
+        with Client(address) as client:
+            assert client.call("robot.stop")["held"] is True
 
 
 # Where the robot's first desk is let in meanwhile
@@ -168,8 +185,9 @@ def serve(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., tuple[Daemon, 
     """A daemon in a thread, that ends when it is idle as soon as it `may_end`."""
     made: list[tuple[Daemon, threading.Thread]] = []
 
-    def serve(text: str = ROBOT, **options: Any) -> tuple[Daemon, threading.Thread]:
+    def serve(text: str = ROBOT, outdated: str = "", **options: Any) -> tuple[Daemon, threading.Thread]:
         robot = config(tmp_path, text.replace("linger_s", 'records = "records"\nlinger_s'))
+        robot = msgspec.structs.replace(robot, outdated=outdated)
         daemon = Daemon(robot, listen("127.0.0.1", 0), **options)
         thread = threading.Thread(target=daemon.run, name="daemon")
         thread.start()
@@ -199,6 +217,15 @@ def test_it_ends_idle_after_linger_s_and_was_not_told(serve: Callable[..., Any],
     assert not thread.is_alive()
     assert (daemon.told, bench.left.stopped) == (False, 1)
     assert daemon._listener.fileno() >= 0  # who comes now is not lost
+
+
+def test_where_its_file_cannot_be_used_it_ends_soon_to_find_it_mended(serve: Callable[..., Any]) -> None:
+    """It was refused until nobody had asked for `linger_s`, and a desk asks every few seconds."""
+    lingers = re.sub(r"linger_s = \S+", "linger_s = 300", ROBOT)
+    daemon, thread = serve(lingers, outdated="robot.toml: is broken")
+    may_end(daemon)
+    thread.join(WAIT_S)
+    assert not thread.is_alive()
 
 
 def _stays(thread: threading.Thread) -> bool:

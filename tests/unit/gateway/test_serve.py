@@ -1,11 +1,13 @@
 """`gwrms gateway` as a command: its manual, its exit status, its errors."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-from gateway.cli.serve import _parser, _robot
-from gateway.connections.listeners import listen
+from gateway.cli import serve
+from gateway.cli.serve import MOST_KEPT, NOT_KEPT, _parser, _robot
+from gateway.connections.listeners import Listeners, listen
 from gateway.main import main
 from tests.unit.gateway.harness import ROBOT
 
@@ -81,7 +83,7 @@ def test_a_device_s_file_that_cannot_be_used_is_logged_at_its_start(
 ) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(ROBOT.replace('eds = "joint_drive.eds"', 'eds = "joint_drve.eds"', 1), encoding="utf-8")
-    robot = _robot(_parser().parse_args([str(file)]), tell=tell)
+    robot, _kept = _robot(_parser().parse_args([str(file)]), tell=tell)
     assert "left_knee" in robot.joint
     said = [record.getMessage() for record in caplog.records]
     about = [one for one in said if one.startswith(f"{file}: [joint.left_knee]")]
@@ -89,3 +91,27 @@ def test_a_device_s_file_that_cannot_be_used_is_logged_at_its_start(
     assert all(
         "there is no EDS file 'joint_drve.eds'" in one and "'joint_drive.eds'?" in one for one in about
     )
+
+
+def test_a_file_too_large_to_be_kept_is_said_to_be(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    file = tmp_path / "robot.toml"
+    name = '[robot]\nname = "x"\n#'
+    for length, kept in ((MOST_KEPT, True), (MOST_KEPT + 1, False)):
+        file.write_text(name.ljust(length), encoding="utf-8")
+        _config, text = _robot(_parser().parse_args([str(file)]), tell=True)
+        assert bool(text) is kept
+        assert (NOT_KEPT % (file, MOST_KEPT) in caplog.messages) is not kept
+
+
+def test_what_was_kept_and_is_not_valid_any_more_is_no_robot_and_is_kept_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another version of the program may have kept it, or may come back."""
+    file, rested = tmp_path / "robot.toml", list[Mapping[str, str]]()
+    file.write_text("[robot]\n", encoding="utf-8")
+    monkeypatch.setattr(serve, "rest", lambda _listeners, kept: rested.append(kept))
+    with listen("127.0.0.1", 0) as port:
+        monkeypatch.setattr(serve, "inherited", lambda _environ: Listeners(port, woken=True))
+        monkeypatch.setenv("GWRMS_VALID_FILE", "[robot]\nnme = 1")
+        assert main(["gateway", str(file)]) == 1
+    assert rested == [{"GWRMS_VALID_FILE": "[robot]\nnme = 1"}]

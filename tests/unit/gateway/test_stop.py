@@ -28,6 +28,7 @@ def test_a_stop_needs_no_lease_and_answers_per_drive(connect: Callable[[], Clien
         "controllers": {},
         "fallbacks": {},
         "problem": None,
+        "outdated": None,
     }
     assert (bench.left.stops, bench.right.stops) == (1, 1)
     stop = other.call("robot.describe")["stop"]
