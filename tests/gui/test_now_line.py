@@ -6,8 +6,10 @@ import time
 import pytest
 
 from gateway.client import ConnectionState
+from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.stop import Stopped
-from server_gui.core.follow.events import LinkChanged
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.frame.header import _drives as header_drives
 from server_gui.views.marks import time_of_day
@@ -107,6 +109,21 @@ def test_a_held_stop_stays_in_headline_and_card_while_no_data_comes(
     assert "no data for 0." in doing(station)[0]
     assert all(words.startswith("STOPPED") for words in doing(station)), "also where there is little room"
     assert header_drives(station).main == "Off when last seen"
+
+
+def test_a_held_stop_is_on_the_card_beside_another_trouble(bench: Bench) -> None:
+    """Beside a full bus the card said *0 of 6 enabled* alone."""
+    now_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    station = bench.station
+    bench.look_again([walking(10), looked(), telemetry([now_ns], states, now_ns)])
+    station.stopping.answered(station.stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    assert doing(station)[0] == "0 of 6 enabled", "the line above says STOPPED"
+    lost = {"left_insole": QualityInfo(state="lost", age_ms=900.0, problem="it does not answer")}
+    bench.look_again([Looked(Snapshot(0, {}, {}, lost), looked().parameters, time.monotonic_ns())])
+    assert station.alarms.worst is not None
+    assert station.alarms.worst.kind is Kind.LOST
+    assert doing(station) == ("STOPPED · 0 of 6 enabled", "STOPPED · 0/6 enabled", "STOPPED")
 
 
 def test_drives_that_were_enabled_when_data_ended_are_not_called_stopped(

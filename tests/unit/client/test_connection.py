@@ -17,7 +17,7 @@ from gateway.client import (
 )
 from gateway.client.address import Address
 from gateway.client.connection import Connection
-from tests.fake_robot import FakeRobot
+from tests.fake_robot import FakeRobot, Refusal
 from tests.unit.client.in_loop import in_loop
 
 ONCE = LinkSettings(reconnect=False, silence_s=30.0)
@@ -83,6 +83,27 @@ async def test_every_waiting_call_fails_when_the_link_drops(robot: FakeRobot) ->
     for outcome in await asyncio.gather(*calls, return_exceptions=True):
         assert isinstance(outcome, LinkLost)
     assert isinstance(await connection.closed, LinkLost)
+
+
+@pytest.mark.parametrize("answers_then", [False, True])
+@in_loop
+async def test_a_link_that_ends_after_a_refusal_gives_its_reason(
+    robot: FakeRobot, answers_then: bool
+) -> None:
+    """A robot whose file is broken refuses and closes: the link said only that it was closed."""
+
+    def refuse(_params: object) -> dict[str, object]:
+        raise Refusal(-32002, "robot.toml: is broken")
+
+    robot.overrides["robot.describe"] = refuse
+    connection = await _open(robot)
+    with pytest.raises(RemoteError):
+        await connection.call("robot.describe", {}, 10.0)
+    if answers_then:
+        await connection.call("clock.read", {}, 10.0)
+    await asyncio.to_thread(robot.cut)
+    said = str(await connection.closed)
+    assert ("robot.toml: is broken" in said) is not answers_then
 
 
 @in_loop
