@@ -4,6 +4,7 @@ Probabilities, what it promises of its sets and the limit of what it knows come 
 then it learns from all.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -79,16 +80,8 @@ def learn(
 
 def _classes(lesson: _Lesson) -> Learned:
     recipe, truth = lesson.recipe, lesson.truth
-    can = lesson.task.classes(recipe)
-    rows = np.flatnonzero(np.isin(truth, can))
-    classes = tuple(name for name in can if (truth[rows] == name).any())
-    if len(classes) < 2:
-        raise UnusableData(
-            f"{recipe.name} needs examples of two classes, of {', '.join(can)}; there are those of"
-            f" {', '.join(classes) or 'none'}"
-        )
-    for name in classes:
-        _enough(name, int((truth == name).sum()))
+    classes = learned_classes(lesson.task, recipe, Counter(truth.tolist()))
+    rows = np.flatnonzero(np.isin(truth, classes))
     targets = (truth[rows, None] == np.array(classes)).argmax(axis=1)
     model, unseen, limits = _taught(lesson, rows, targets, _classifier, len(classes))
     temperature = _temperature(unseen, targets)
@@ -104,7 +97,7 @@ def _phases(lesson: _Lesson) -> Learned:
     rows = np.flatnonzero(missing.all(axis=1) | ~missing.any(axis=1))
     truth = lesson.truth[rows].astype(np.float64)
     steps = ~np.isnan(truth[:, 0])
-    _enough("steps", int(steps.sum()))
+    learned_classes(lesson.task, lesson.recipe, {STRIDE: int(steps.sum())})
     model, unseen, limits = _taught(lesson, rows, pointers(truth), _regressor, 4)
     phases, lengths = on_circle(unseen.astype(np.float32))
     error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
@@ -116,6 +109,25 @@ def _phases(lesson: _Lesson) -> Learned:
     promise = promised(np.where(right, 0.0, sure), sure[steps], lesson.group[rows])
     numbers = {**asdict(promise), **limits}
     return Learned(lesson.task, lesson.recipe, (STRIDE,), model, numbers)
+
+
+def learned_classes(task: Task, recipe: Recipe, examples: Mapping[str, int]) -> tuple[str, ...]:
+    """Return the classes that are learned from so many examples of each; for gait_phase, of `STRIDE`.
+
+    Raises:
+        UnusableData: too few classes or examples.
+
+    """
+    can = task.classes(recipe)
+    classes = tuple(name for name in can if examples.get(name))
+    if task.fold and len(classes) < 2:
+        raise UnusableData(
+            f"{recipe.name} needs examples of two classes, of {', '.join(can)}; there are those of"
+            f" {', '.join(classes) or 'none'}"
+        )
+    for name in classes if task.fold else can:
+        _enough(name if task.fold else "steps", examples.get(name, 0))
+    return classes
 
 
 def pointers(truth: Floats) -> Rows:

@@ -1,11 +1,12 @@
-"""Split of sessions into training and judging, and the choice of sensors."""
+"""Split of sessions into training and judging, and the choice of sensors and classes."""
 
 import hashlib
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Final
 
 from ml.errors import UnusableData
 from ml.features.recipe import Recipe
+from ml.robot.learn import LEAST_ROWS
 from ml.robot.task import Task
 from ml.store.labels import person
 from ml.training.dataset import SessionDecisions
@@ -86,6 +87,15 @@ def _known(name: str, known: Sequence[str], others: int) -> str:
 def _place(name: str) -> float:
     """Return a place from 0 to 1, the same for ever."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8]) / 2**64
+
+
+def too_few(examples: Mapping[str, int]) -> dict[str, str]:
+    """Return the classes that are left out, of so many examples to learn from, and what is said of each."""
+    return {
+        name: f"{name} is left out: {count} examples; it takes {LEAST_ROWS}"
+        for name, count in sorted(examples.items())
+        if count < LEAST_ROWS
+    }
 
 
 def split(

@@ -19,7 +19,7 @@ from ml.features.windows import Samples
 from ml.registry.registry import Registry
 from ml.robot.groups import unit
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
-from ml.robot.task import TASKS, recipe_named
+from ml.robot.task import TASKS, Task, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
 from ml.store.labels import REGRESSION, Label, LabelSource, holding, wearers
@@ -110,7 +110,7 @@ def _part(ask: Ask) -> SessionDecisions:
     rows = recorded(store, ask.robot, ask.session, recipe.channels, _version(store, ask))
     found, stamps_ns, ranges = _decisions(recipe, rows)
     labels = _labels(store, ask)
-    truth, source = _truth(recipe, _said(labels, rows), stamps_ns)
+    truth, source = truth_at(_task(recipe), _said(labels, rows), stamps_ns)
     if ask.teacher:
         _teach(ask, store, (truth, source), stamps_ns)
     known = source != NOBODY
@@ -130,7 +130,7 @@ def _part(ask: Ask) -> SessionDecisions:
 def _decisions(recipe: Recipe, rows: Recorded) -> tuple[Features, Instants, Samples]:
     """Return features of every full window that a decision is due about, its newest stamp, and the ranges."""
     _check_rows(recipe, rows)
-    every_ns = EVERY_MS[recipe.name.partition("/")[0]] * 1_000_000
+    every_ns = EVERY_MS[_task(recipe).name] * 1_000_000
     parts, stamps, seen = [], [], []
     for grid_ns, samples in on_grid(recipe, rows.stamps_ns, rows.values):
         ends = np.flatnonzero(grid_ns % every_ns == 0)
@@ -141,7 +141,7 @@ def _decisions(recipe: Recipe, rows: Recorded) -> tuple[Features, Instants, Samp
             seen.append(samples)
     if not parts:
         raise UnusableData(
-            f"no {_look_back_s(recipe):g} s of it are without a gap: {_worst(recipe, rows.values)}"
+            f"no {look_back_s(recipe):g} s of it are without a gap: {_worst(recipe, rows.values)}"
         )
     ranges = np.quantile(np.concatenate(seen), RANGE, axis=0).T
     return np.concatenate(parts), np.concatenate(stamps), ranges
@@ -155,11 +155,12 @@ def _check_rows(recipe: Recipe, rows: Recorded) -> None:
         missing = ", ".join(recipe.channels[at] for at in empty)
         raise UnusableData(f"it has no value of {missing}, which {recipe.name} needs")
     length_s = (rows.stamps_ns[-1] - rows.stamps_ns[0]) / 1e9
-    if length_s < _look_back_s(recipe):
-        raise UnusableData(f"it lasts {length_s:.1f} s: {recipe.name} looks back {_look_back_s(recipe):g} s")
+    if length_s < look_back_s(recipe):
+        raise UnusableData(f"it lasts {length_s:.1f} s: {recipe.name} looks back {look_back_s(recipe):g} s")
 
 
-def _look_back_s(recipe: Recipe) -> float:
+def look_back_s(recipe: Recipe) -> float:
+    """Return how much of a recording comes before its first decision."""
     return recipe.look_back / recipe.rate_hz
 
 
@@ -197,8 +198,8 @@ def _said(labels: Sequence[Label], rows: Recorded) -> list[LabelSpan]:
     ]
 
 
-def _truth(recipe: Recipe, said: Sequence[LabelSpan], stamps_ns: Instants) -> tuple[npt.NDArray[Any], Names]:
-    task = TASKS[recipe.name.partition("/")[0]]
+def truth_at(task: Task, said: Sequence[LabelSpan], stamps_ns: Instants) -> tuple[npt.NDArray[Any], Names]:
+    """Return truth and source, as in `SessionDecisions`, of decisions by their newest stamps (n,)."""
     about_ns = stamps_ns - task.delay_ms * 1_000_000
     if not task.fold:
         return phases(said, about_ns)
@@ -208,6 +209,10 @@ def _truth(recipe: Recipe, said: Sequence[LabelSpan], stamps_ns: Instants) -> tu
     for name in np.unique(names):
         folded[names == name] = task.fold.get(str(name), NOBODY)
     return folded, np.where(np.isin(names, list(task.fold)), sources, NOBODY)
+
+
+def _task(recipe: Recipe) -> Task:
+    return TASKS[recipe.name.partition("/")[0]]
 
 
 def _recorded_wearer(store: Store, ask: Ask) -> str:

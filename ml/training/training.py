@@ -21,12 +21,12 @@ from ml.registry.code import features_hash
 from ml.registry.code import versions as library_versions
 from ml.registry.registry import Registry
 from ml.robot.groups import unit
-from ml.robot.learn import LEAST_ROWS, learn
+from ml.robot.learn import learn
 from ml.robot.learned import Learned
 from ml.robot.task import Task
 from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
-from ml.training.data_split import held_out, judging, recipe_for, split
+from ml.training.data_split import held_out, judging, recipe_for, split, too_few
 from ml.training.dataset import LeftOut, SessionDecisions
 from ml.training.judging import Decision, Judged, decide, judge
 from ml.training.training_sessions import Material, Wish, material
@@ -195,10 +195,9 @@ def _enough(task: Task, lessons: Sequence[SessionDecisions]) -> tuple[list[Sessi
     if not task.fold or not lessons:
         return list(lessons), []
     counts = Counter(np.concatenate([each.truth for each in lessons]).tolist())
-    rare = sorted(name for name, count in counts.items() if count < LEAST_ROWS)
-    kept = [each.of(~np.isin(each.truth, rare)) for each in lessons]
-    remarks = [f"{name} is left out: {counts[name]} examples; it takes {LEAST_ROWS}" for name in rare]
-    return [each for each in kept if len(each.truth)], remarks
+    rare = too_few(counts)
+    kept = [each.of(~np.isin(each.truth, list(rare))) for each in lessons]
+    return [each for each in kept if len(each.truth)], list(rare.values())
 
 
 def _unnamed(sessions: int) -> list[str]:

@@ -21,7 +21,7 @@ NOBODY: Final = ""  # the name where nobody knows
 STRIDE_S: Final = (0.5, 2.5)  # shorter and longer ones are no strides, or a strike between them was missed
 STILL: Final = ("stand", "sit", "sit_to_stand", "stand_to_sit")  # in which no leg steps
 LOST: Final = ("fall", "lying", "get_up")  # in which a phase means nothing
-_STRIKES: Final = ("left_heel_strike", "right_heel_strike")
+STRIKES: Final = ("left_heel_strike", "right_heel_strike")
 _NAME: Final = np.array(ACTIVITIES).dtype
 
 
@@ -63,7 +63,7 @@ def phases(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Samples, Names]:
 
     NaN, NaN where no leg steps; the source is NOBODY where that is not known, or of one leg alone.
     """
-    legs, by = zip(*(_leg(said, strike, at_ns) for strike in _STRIKES), strict=True)
+    legs, by = zip(*(_leg(said, strike, at_ns) for strike in STRIKES), strict=True)
     found = np.stack(legs, axis=1)
     names, sources = activities(said, at_ns)
     steps = ~np.isnan(found).any(axis=1) & ~np.isin(names, LOST)

@@ -78,9 +78,9 @@ class TrainForm(Card):
         self._models.look_for_lessons(str(self.task.currentData()), str(self.robot.currentData()))
         lessons = self._models.lessons
         self.judges.show_lessons(lessons or Lessons())
-        problem = "" if lessons is None else lessons.problem
-        set_text(self.said, _said(lessons, self.judges.chosen))
-        set_tone(self.said, "warn" if problem else "")
+        said, is_fine = _said(lessons, self.judges.chosen)
+        set_text(self.said, said)
+        set_tone(self.said, "" if is_fine else "warn")
         is_reached = self._models.reach.problem is None
         self.begin.setEnabled(not self._models.is_training and is_reached and lessons is not None)
 
@@ -89,15 +89,20 @@ class TrainForm(Card):
         self.wished.emit(TrainingWish(task, robot, self.judges.chosen))
 
 
-def _said(lessons: Lessons | None, chosen: Sequence[str]) -> str:
-    """Return who will judge, or why nobody can."""
+def _said(lessons: Lessons | None, chosen: Sequence[str]) -> tuple[str, bool]:
+    """Return who will judge, or why nobody can; and whether that is fine."""
     if lessons is None:
-        return LOOKING
-    if lessons.problem:
-        return f"▲ {lessons.problem}"
-    if chosen:
-        return f"Judged by {', '.join(chosen)}; it learns from the others."
-    return f"Nobody is chosen: judged by {', '.join(sorted(lessons.usual))}, {QUARTER}."
+        return LOOKING, True
+    judges = lessons.judges(chosen)
+    if judges.problem:
+        return f"▲ {judges.problem}", False
+    names = ", ".join(sorted(judges.names))
+    said = (
+        f"Judged by {names}; it learns from the others."
+        if chosen
+        else f"Nobody is chosen: judged by {names}, {QUARTER}."
+    )
+    return " ".join([said, *(f"▲ {each}." for each in judges.left_out)]), not judges.left_out
 
 
 def offer_robots(choice: QComboBox, robots: Iterable[str]) -> None:
