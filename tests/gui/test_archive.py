@@ -344,3 +344,8 @@ def test_what_a_recording_began_with_is_in_the_window_s_units(archive: Archive, 
     bench.desk.shown.change(Units(by_si={"m": "m"}))
     assert archive.held_then(Session("exo-01", "s", parameters=held))[0] == "gait.step_length = 0.43 m"
     assert archive.held_then(Session("elsewhere", "s", parameters=held))[0] == "gait.step_length = 0.43 (SI)"
+    zero = {"gait.step_length": 0.0, "gone.gain": 0}
+    assert archive.held_then(Session("exo-01", "s", parameters=zero)) == [
+        "gait.step_length = 0 m",
+        "gone.gain = 0 (SI)",
+    ]

@@ -11,15 +11,17 @@ from server_gui.core.cloud.tape import Tape
 KNEE, HIP = "left_knee.max_torque", "left_hip.max_torque"
 
 
-def opened(*events: dict[str, str], setup: dict[str, str] | None = None) -> RecordedParameters:
-    session = SimpleNamespace(parameters={KNEE: 80, HIP: None}, setup=setup or {})
+def opened(
+    *events: dict[str, str], setup: dict[str, str] | None = None, start: object = 80
+) -> RecordedParameters:
+    session = SimpleNamespace(parameters={KNEE: start, HIP: None}, setup=setup or {})
     made = RecordedParameters()
     made.open(cast("Tape", SimpleNamespace(session=session, events=events)))
     return made
 
 
 def entry(what: str, at_ns: int, **more: Any) -> dict[str, Any]:
-    return {"what": what, "utc_ns": at_ns, "write": 7, **more}
+    return {"what": what, "utc_ns": at_ns, "write": 7} | more
 
 
 def knee(parameters: RecordedParameters, at_ns: int) -> float | None:
@@ -50,6 +52,25 @@ def test_a_write_counts_from_when_it_was_done_and_a_trial_until_it_was_taken_bac
     )
     assert made.told
     assert [knee(made, at_ns) for at_ns in (9, 11, 12, 19, 20, 99)] == [80, None, 40, 40, 80, 80]
+
+
+@pytest.mark.parametrize(("start", "value"), [(0, 0.0), (0.0, 0.0), (-0.0, 0.0), (False, 0.0), (None, None)])
+def test_zero_is_a_value_and_what_is_not_known_is_none(start: object, value: float | None) -> None:
+    made = opened(start=start)
+    assert knee(made, 0) == value
+    made.tell(
+        [
+            entry("write", 10, before={KNEE: start}, after={KNEE: 40}),
+            entry("trial begun", 12, after={KNEE: 40}),
+            entry("taken back", 20),
+            entry("write", 30, before={KNEE: start}, after={KNEE: 0}, write=0),
+            entry("write done", 32, after={KNEE: 0}, write=0),
+        ],
+        0,
+        50,
+    )
+    assert [knee(made, at_ns) for at_ns in (9, 12, 20, 31, 32)] == [value, 40, value, None, 0.0]
+    assert KNEE in made.at(50)
 
 
 @pytest.mark.parametrize("what", ["NOT TAKEN BACK yet", "ROLL-BACK FAILED", "claimed by the stop"])

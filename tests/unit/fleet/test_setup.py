@@ -86,6 +86,15 @@ def test_what_a_busy_robot_tells_later_is_of_the_session_too(tmp_path: Path) -> 
     assert msgspec.json.decode(newest["setup"])["firmware/left_knee"] == "1.2"
 
 
+def test_a_value_of_zero_is_known_and_no_later_one_takes_its_place(tmp_path: Path) -> None:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        keeping = RobotRecording("exo-01", recorder)
+        for event in (knee(), told(a=0.0, b=None, c=0), told(a=5.0, b=0.0, c=5), told(a=6.0, b=6.0, c=6)):
+            keeping.take(event)
+    newest = Kept.of(tmp_path / "spool").table("sessions", "exo-01")[-1]
+    assert msgspec.json.decode(newest["parameters"]) == {"a": 0.0, "b": 0.0, "c": 0}
+
+
 def asked(robot: FakeRobot) -> None:
     """Let it have an object dictionary behind the left knee, and none behind another."""
 
