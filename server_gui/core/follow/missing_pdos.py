@@ -110,16 +110,17 @@ class MissingPdos:
     ) -> tuple[BusInfo, ...]:
         """Return the buses of a look with nodes that have their history, where that says otherwise.
 
-        A node that is missing from a look begins anew with the next one that has it.
+        A node that is missing from a look begins anew with the next one that has it; all do where the clock
+        has gone back.
         """
-        is_lost = self._looked_ns is not None and now_ns - self._looked_ns > LOST_NS
+        is_lost = self._looked_ns is not None and not 0 <= now_ns - self._looked_ns <= LOST_NS
         known = {} if is_lost else self._nodes
         keys = [(bus.name, node.node_id) for bus in buses for node in bus.nodes]
         self._nodes = {key: known.get(key) or NodeHistory() for key in keys}
         self._looked_ns = now_ns
         if (cpu_percent or 0.0) >= BUSY_PERCENT:
             self._busy_ns = now_ns
-        is_busy = self._busy_ns is not None and now_ns - self._busy_ns <= KEPT_NS
+        is_busy = self._busy_ns is not None and 0 <= now_ns - self._busy_ns <= KEPT_NS
         return tuple(self._bus(bus, now_ns, is_busy) for bus in buses)
 
     def _bus(self, bus: BusInfo, now_ns: int, is_busy: bool) -> BusInfo:

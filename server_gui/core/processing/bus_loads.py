@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from gateway.wire.bus import BusInfo
 from server_gui.core.processing.history import Floats, History
 
@@ -9,7 +11,10 @@ LOAD = ("load_percent",)
 
 
 class BusLoads:
-    """By the name of a bus; a look that did not tell its load is a gap."""
+    """By the name of a bus; a look that did not tell its load is a gap.
+
+    A bus that is gone is forgotten with its last load.
+    """
 
     def __init__(self) -> None:
         self._known: dict[str, History] = {}
@@ -21,6 +26,12 @@ class BusLoads:
             self._known[name] = History(LOAD)
         for name, history in self._known.items():
             history.append(at_ns / 1e9, (found.get(name),))
+        if buses is not None:
+            self._known = {
+                name: history
+                for name, history in self._known.items()
+                if name in found or np.isfinite(history.recent()[:, 1]).any()
+            }
 
     def recent(self, name: str) -> Floats:
         """Return (rows, 2): time in s and load in percent, NaN where it is not known."""

@@ -22,7 +22,11 @@ class BusTurns:
         if buses is None:
             return []
         found = [text for bus in buses for text in self._of(bus, now_ns)]
-        self._known = {key: one for key, one in self._known.items() if now_ns - one[1] < OVER_NS}
+        self._known = {
+            key: (level, min(seen_ns, now_ns))  # a clock that goes back makes nothing last longer
+            for key, (level, seen_ns) in self._known.items()
+            if now_ns - seen_ns < OVER_NS
+        }
         return found
 
     def _of(self, bus: BusInfo, now_ns: int) -> Iterator[str]:

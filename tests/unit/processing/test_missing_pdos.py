@@ -114,6 +114,22 @@ def test_what_was_seen_before_a_time_without_a_look_lasts_no_longer() -> None:
     assert level(watched.take((fine,), 2 * LOST_NS + 2 * SECOND_NS)[0]) is Level.GOOD
 
 
+def test_a_clock_that_goes_back_begins_anew() -> None:
+    """What was seen at a later time lasted until the clock was there again, and a busy computer with it."""
+    watched, hour_ns = MissingPdos(), 3600 * SECOND_NS
+    bus = replace(BUS, nodes=[replace(NODE, node_id=number, pdos_missing_percent=20.0) for number in (1, 2)])
+    (before,) = watched.take((bus,), hour_ns, 99.0)
+    assert "computer is overloaded" in findings(before)[0][0]
+    (after,) = watched.take((bus,), 0, 20.0)
+    assert "20 % of their PDOs are missing" in findings(after)[0][0], "many are told at once"
+    assert "overloaded" not in findings(after)[0][0]
+    fine = replace(BUS, nodes=[replace(node, pdos_missing_percent=0.0) for node in bus.nodes])
+    (none,) = MissingPdos().take((fine,), 0)
+    watched = MissingPdos()
+    watched.take((bus,), hour_ns)
+    assert watched.take((fine,), 0) == (none,)
+
+
 def test_a_few_that_last_are_told_however_far_apart_looks_are() -> None:
     assert LOST_NS >= BEGINS_NS
     for every_s in (0.5, 1.0, 5.5, LOST_NS / SECOND_NS):
