@@ -101,6 +101,7 @@ class RobotRecording:
         same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found
+            self._pdos, self._turns = MissingPdos(), BusTurns()  # what a session before has told is not in it
             self.session, self.began_s = self._recorder.begin(self._robot, found), time.time()
 
     def _lacks_parameters(self) -> bool:

@@ -221,6 +221,49 @@ def test_the_trouble_of_a_bus_is_recorded_and_flagged_in_the_replay() -> None:
     assert (flag.kind, flag.text) == (FlagKind.BUS, "can0: bus off")
 
 
+def test_each_session_is_told_the_trouble_of_its_buses_and_none_of_the_one_before() -> None:
+    said: list[str] = []
+    recorder = SimpleNamespace(
+        event=lambda _robot, _kind, text: said.append(text),
+        describe=lambda *_: None,
+        begin=lambda *_: said.append("begins"),
+        end=lambda _robot: said.append("ends"),
+    )
+    keeping = RobotRecording("exo-01", cast("Recorder", recorder))
+    node = NodeInfo(3, ["left_knee"], 0.4, 1.0, 1, 0, 0, 8.0)
+    missing, off, fine = (
+        msgspec.structs.replace(BUS, **now)
+        for now in (
+            {"nodes": [node]},
+            {"state": "bus off"},
+            {"nodes": [msgspec.structs.replace(node, pdos_missing_percent=0.0)]},
+        )
+    )
+    first = described()
+    another = Described(msgspec.structs.replace(first.description, boot_id="another"))
+
+    def see(at_s: int, *buses: BusInfo) -> None:
+        keeping.take(BusesSeen(buses, at_s * 10**9))
+
+    keeping.take(first)
+    see(1, off)
+    keeping.take(first)  # another link of the same session
+    see(2, off)
+    assert said == ["begins", "can0: bus off"]
+    keeping.take(another)
+    see(3, off)
+    assert said[2:] == ["begins", "can0: bus off"]
+    keeping.pause()
+    see(4, missing)
+    keeping.go_on("")
+    see(5, missing)
+    assert said[4:] == ["ends", "begins", "can0: left knee: 8 % of its PDOs are missing"]
+    keeping.take(first)
+    see(6, fine)
+    see(20, fine)
+    assert said[7:] == ["begins"], "missing PDOs do not last into the next session"
+
+
 def test_a_stop_that_is_not_confirmed_has_a_flag_also_where_no_data_came(bench: Bench) -> None:
     station = bench.station
     station.take([described(), walking(10)])

@@ -214,9 +214,15 @@ def test_what_only_a_model_has_said_teaches_nothing(folder_url: str, tmp_path: P
         folder_url,
         tmp_path / "spool",
         made("mon", (4.0, 8.0, "walk", LabelSource.PSEUDO), wearer="Ada"),
-        made("tue", (4.0, 7.0, "stand", PERSON), (7.0, 9.0, "walk", LabelSource.PSEUDO), wearer="Bob"),
+        made(
+            "tue",
+            (4.0, 7.0, "stand", PERSON),
+            (6.0, 9.0, "walk", LabelSource.PSEUDO),
+            (10.0, 11.0, "stand", PERSON),
+            wearer="Bob",
+        ),
     )
-    assert {name: one.said for name, one in found.items()} == {"Bob": "stand 3.0 s"}
+    assert {name: one.said for name, one in found.items()} == {"Bob": "stand 4.0 s"}
 
 
 def test_who_judges_is_who_would_where_nobody_is_chosen(folder_url: str, tmp_path: Path) -> None:
@@ -255,6 +261,10 @@ def test_classes_of_which_too_few_teach_are_told_before() -> None:
     assert found.judges(["ada"]).left_out == ()
     few = taught(ada=both | {"sit": 19, "stairs_up": 0}, bob=both, cid=both)
     assert few.judges(["cid"]).left_out == ("sit is left out: 19 examples; it takes 20",)
+    judge = taught(ada=both | {"sit": 15}, bob=both, cid=both | {"sit": 15})
+    assert judge.judges(["cid"]).left_out == ("sit is left out: 15 examples; it takes 20",), (
+        "a judge's teach not"
+    )
     alone = taught(ada={"walk": 50}, bob={"walk": 50, "sit": 19}, cid=both)
     assert "needs examples of two classes" in alone.judges(["cid"]).problem
 
