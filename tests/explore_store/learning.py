@@ -69,7 +69,7 @@ def _changes(world: World, known: dict[str, tuple[str, ...]]) -> Iterator[tuple[
     yield from ((task, "GROUPS", known), (task, "BLOCKS", {TASK: {"knees": _newest}}), (task, "RATE_HZ", 100))
     yield from ((learn, "LEAST_ROWS", 1), (learn, "EPOCHS", 1), (learn, "HIDDEN", (2,)))
     yield dataset, "EVERY_MS", {TASK: 10}
-    yield from ((training, "LEAST_ROWS", 1), (training, "split", functools.partial(_split, world)))
+    yield from ((data_split, "LEAST_ROWS", 1), (training, "split", functools.partial(_split, world)))
     yield Pointers, "_create", functools.partialmethod(_create, world)
 
 
