@@ -245,6 +245,18 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert judges.chosen == ()
     QTest.keyClick(judges, Qt.Key.Key_Space)
     whole.until(lambda: "Judged by s3" in page.form.said.text(), "said by whom it is judged")
+    others = [item for name in ("s1", "s2") for item in judges.findItems(name, Qt.MatchFlag.MatchExactly)]
+
+    def turn_others() -> None:
+        for middle in [judges.visualItemRect(item).center() for item in others]:
+            QTest.mouseClick(judges.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+
+    turn_others()
+    whole.until(lambda: "it takes two to learn from" in page.form.said.text(), "said that too few are left")
+    assert page.form.said.property("tone") == "warn"
+    turn_others()
+    whole.until(lambda: "Judged by s3;" in page.form.said.text(), "said that enough are left again")
+    assert page.form.said.property("tone") == ""
     click(page.form.begin)
     (job,) = archive.models.jobs.jobs
     whole.draw()
