@@ -128,7 +128,7 @@ def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
             return
         # Each by a timer of its own, made before the monkey acts: a menu that is open has an event loop of
         # its own, which goes on doing this, but never calls a timer again that waits for the menu.
-        QTimer.singleShot(0, step)
+        QTimer.singleShot(1, step)
         left -= 1
         day.frame(left)
         window.refresh()
