@@ -1,7 +1,7 @@
 """`gwrms sessions gait`: how somebody walked in a recording, by the same code as live."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pyarrow as pa
@@ -18,6 +18,7 @@ from server_gui.cli.cloud_options import (
 )
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import LegGait
+from server_gui.core.processing.joint_measures import Error
 from server_gui.core.processing.recording import RecordedGait, summarise
 from server_gui.core.processing.wiring import Wiring
 
@@ -26,6 +27,7 @@ formula. A minute of recording takes a quarter of a second.
 
 example
   gwrms sessions gait 20261121T1530 --from 10 --to 70"""
+ERRORS = ("JOINT", "TRACKING ERROR (RMS)", "LARGEST", "")
 LEGS = ("LEG", "STRIDES", "STRIDE", "STEP", "STANCE", "SWING", "VARIABILITY")
 
 
@@ -50,7 +52,7 @@ def gait(argv: list[str]) -> int:
         for part in recorded.telemetry(names, begin, end):
             parts.append(part)
             advance(part.num_rows)
-    found = _summary(parts, names)
+    found = _summary(parts, names, recorded.enabled)
     if arguments.json:
         say_json({"gait": found.gait, "errors": found.errors, "events": len(found.events)})
     else:
@@ -58,11 +60,13 @@ def gait(argv: list[str]) -> int:
     return 0
 
 
-def _summary(parts: list[pa.Table], names: list[str]) -> RecordedGait:
+def _summary(
+    parts: list[pa.Table], names: list[str], enabled: Mapping[str, frozenset[float]]
+) -> RecordedGait:
     if not parts:
         return summarise(np.empty(0, np.int64), {})
     rows = pa.concat_tables(parts)
-    return summarise(rows["stamp_ns"].to_numpy(), {name: rows[name].to_numpy() for name in names})
+    return summarise(rows["stamp_ns"].to_numpy(), {name: rows[name].to_numpy() for name in names}, enabled)
 
 
 def _told(found: RecordedGait) -> Iterator[str]:
@@ -78,14 +82,22 @@ def _told(found: RecordedGait) -> Iterator[str]:
         )
         yield f"symmetry (left − right, 0 is even): {uneven}"
     ranges = [(joint, f"{math.degrees(angle):.1f}°") for joint, angle in sorted(walk.ranges.items())]
-    errors = [
-        (joint, f"{math.degrees(error.rms):.2f}°", f"{math.degrees(error.largest):.2f}°")
-        for joint, error in sorted(found.errors.items())
-    ]
     if ranges:
         yield "\n" + table(("JOINT", "RANGE OF MOTION"), ranges, right=(1,)).rstrip("\n")
-    if errors:
-        yield "\n" + table(("JOINT", "TRACKING ERROR (RMS)", "LARGEST"), errors, right=(1, 2)).rstrip("\n")
+    if found.errors:
+        rows = [(joint, *_error(error)) for joint, error in sorted(found.errors.items())]
+        yield "\n" + table(ERRORS, rows, right=(1, 2)).rstrip("\n")
+
+
+def _error(error: Error | None) -> tuple[str, str, str]:
+    if error is None:
+        return NONE, NONE, "its drive was never enabled"
+    rms, largest = (f"{math.degrees(angle):.2f}°" for angle in (error.rms, error.largest))
+    return (
+        rms,
+        largest,
+        "" if error.while_enabled else "at all times: its drive's state was not recorded",
+    )
 
 
 def _leg(leg: Leg, found: LegGait) -> tuple[str, ...]:

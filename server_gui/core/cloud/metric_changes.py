@@ -21,7 +21,7 @@ from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS, RESOURCES
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.evidence.comparison import Evidence, Spell, compare, differing
-from server_gui.core.evidence.cycles import STATE, Cycle, CycleCutter
+from server_gui.core.evidence.cycles import Cycle, CycleCutter
 from server_gui.core.evidence.measures import CURVES
 from server_gui.core.processing.wiring import Wiring
 
@@ -53,7 +53,7 @@ def walk(
     recorded = known.open(known.find(session.session, session.robot))
     names = [channel.name for channel in recorded.channels]
     joints = tuple(name.rpartition(".")[0] for name in names if name.endswith(".position"))
-    enabled = _enabled(recorded.session)
+    enabled = recorded.enabled
     wanted = Wiring.of(names).channels
     wanted |= {f"{joint}.{curve}" for joint in joints for curve in CURVES} & {*names}
     wanted |= enabled.keys() & {*names}
@@ -136,13 +136,3 @@ def _parts(table: pa.Table) -> Iterator[tuple[list[int], dict[str, list[float | 
         }
         stamps = part["stamp_ns"].to_numpy()
         yield np.asarray(stamps, dtype=np.int64).tolist(), known
-
-
-def _enabled(session: Session) -> dict[str, frozenset[float]]:
-    """Return, by channel, the numbers of a drive that follows its target, if that was recorded."""
-    found = {}
-    for key, said in session.setup.items():
-        section, _, channel = key.partition("/")
-        if section == "enabled" and channel.endswith(f".{STATE}"):
-            found[channel] = frozenset(float(number) for number in str(said).split(",") if number)
-    return found

@@ -27,6 +27,7 @@ from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, ColumnFacts, columns
 from ml.store.translation import translated
 from server_gui.core.cloud import spool_reader
+from server_gui.core.processing.wiring import STATE
 from server_gui.core.recording import missing_rows
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
@@ -227,6 +228,16 @@ class Recorded:
     waiting: int
     _sources: Sequence[TelemetrySource]
     _url: str
+
+    @property
+    def enabled(self) -> dict[str, frozenset[float]]:
+        """The numbers that mean *operation enabled*, by the channel of a drive's state; of those recorded."""
+        found = {}
+        for key, said in self.session.setup.items():
+            section, _, channel = key.partition("/")
+            if section == "enabled" and channel.endswith(f".{STATE}"):
+                found[channel] = frozenset(float(number) for number in str(said).split(",") if number)
+        return found
 
     def telemetry(
         self, names: Sequence[str], begin: datetime | None = None, end: datetime | None = None

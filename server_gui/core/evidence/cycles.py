@@ -13,9 +13,8 @@ from server_gui.core.evidence.measures import CURVES, POINTS, Floats
 from server_gui.core.processing.component import WIRINGS, Columns, ComponentProcessing
 from server_gui.core.processing.gait_events import MAX_GAP_NS, Leg
 from server_gui.core.processing.gait_measures import LONGEST_STRIDE_NS, Stride, symmetry_index
-from server_gui.core.processing.wiring import FORCE, leg_of
+from server_gui.core.processing.wiring import FORCE, STATE, leg_of
 
-STATE: Final = "state"
 ENABLED: Final = "operation enabled"  # the word of a drive's state in which it follows its target
 WAIT_NS: Final = 200_000_000  # for what other components tell of the end of a stride
 KEPT_NS: Final = LONGEST_STRIDE_NS + 2 * WAIT_NS + MAX_GAP_NS

@@ -11,7 +11,7 @@ from gateway.wire.bus import BusInfo
 from gateway.wire.robot import Description
 from server_gui.core.evidence.comparison import Spell, compare
 from server_gui.core.evidence.curves import curves, told_joints
-from server_gui.core.evidence.cycles import ENABLED, STATE, Cycle, CycleCutter
+from server_gui.core.evidence.cycles import ENABLED, Cycle, CycleCutter
 from server_gui.core.evidence.edits import (
     AFTER_NS,
     BACK_NS,
@@ -34,6 +34,7 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.processing.wiring import STATE
 from server_gui.core.recording.journal_tail import news
 from server_gui.core.recording.rows import JournalHead
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 from server_gui.core.processing.foot_imu_events import FootImuEvents
 from server_gui.core.processing.gait_events import MAX_GAP_NS, EventKind, EventSource, GaitEvent, Leg
 from server_gui.core.processing.gait_measures import Gait, GaitMeasures, Stride
-from server_gui.core.processing.joint_measures import Error, Extremes, TrackingError
+from server_gui.core.processing.joint_measures import Extremes
 from server_gui.core.processing.kinematic_events import KinematicEvents
 from server_gui.core.processing.pressure_events import PressureEvents
-from server_gui.core.processing.wiring import POSITION, TRUNK, Fed, Wiring, leg_of
+from server_gui.core.processing.wiring import TRUNK, Wiring, leg_of
 
 EVENTS = 64  # the newest that are kept
 WIRINGS = 64  # sets of columns that are known at a time; a stream of samples has one a component
@@ -35,7 +35,6 @@ class Derived:
     stamp_ns: int = 0  # the newest row, on the robot's clock
     gait: Gait = field(default_factory=Gait)
     sources: Mapping[Leg, EventSource | None] = field(default_factory=dict)  # what gives each leg's events
-    errors: Mapping[str, Error] = field(default_factory=dict)  # of joints that follow a target
     events: tuple[GaitEvent, ...] = ()  # the newest, oldest first
 
 
@@ -62,7 +61,6 @@ class ComponentProcessing:
         self._angles_ns = [0] * TRUNK  # when each of the joints' was taken; 0: never
         self._measures = GaitMeasures()
         self._ranges: dict[str, Extremes] = {}
-        self._errors: dict[str, TrackingError] = {}
         self._events: collections.deque[GaitEvent] = collections.deque(maxlen=EVENTS)
         self._wirings: dict[tuple[str, ...], Wiring] = {}
         self._stamp_ns = 0
@@ -74,7 +72,7 @@ class ComponentProcessing:
         for row, stamp_ns in enumerate(stamps_ns):
             self._stamp_ns = stamp_ns
             self._measures.see(stamp_ns)
-            self._joints(wiring, stamp_ns, row, columns)
+            self._joints(wiring, row, columns)
             for event in self._found(wiring, stamp_ns, row, columns):
                 taken.events.append(event)
                 stride = self._event(event)
@@ -85,12 +83,10 @@ class ComponentProcessing:
     def shown(self, now_ns: int | None = None) -> Derived:
         """Return the derived values at `now_ns` on the robot's clock; by default at the newest row."""
         now_ns = self._stamp_ns if now_ns is None else now_ns
-        errors = ((name, error.at(now_ns)) for name, error in self._errors.items())
         return Derived(
             stamp_ns=self._stamp_ns,
             gait=self._measures.now(now_ns),
             sources={leg: self._best(leg, now_ns) for leg in Leg},
-            errors={name: error for name, error in errors if error is not None},
             events=tuple(self._events),
         )
 
@@ -159,19 +155,11 @@ class ComponentProcessing:
 
     # --- joints
 
-    def _joints(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> None:
+    def _joints(self, wiring: Wiring, row: int, columns: Columns) -> None:
         for channel, joint in wiring.positions:
             value = columns[channel][row]
             if value is not None:
                 self._ranges[joint].take(value)
-        for channel, joint in wiring.errors:
-            value = columns[channel][row]
-            if value is not None:
-                self._errors[joint].take(stamp_ns, value)
-        for channel, joint in wiring.targets:
-            target, position = columns[channel][row], columns.get(f"{joint}.{POSITION}")
-            if target is not None and position is not None and (value := position[row]) is not None:
-                self._errors[joint].take(stamp_ns, target - value)
 
     # --- wiring
 
@@ -181,11 +169,6 @@ class ComponentProcessing:
             if len(self._wirings) >= WIRINGS:
                 self._wirings.clear()
             wiring = self._wirings[channels] = Wiring.of(channels)
-            self._make_room(wiring.positions, wiring.errors + wiring.targets)
+            for _, joint in wiring.positions:
+                self._ranges.setdefault(joint, Extremes())
         return wiring
-
-    def _make_room(self, positions: Sequence[Fed], errors: Sequence[Fed]) -> None:
-        for _, joint in positions:
-            self._ranges.setdefault(joint, Extremes())
-        for _, joint in errors:
-            self._errors.setdefault(joint, TrackingError())

@@ -1,10 +1,13 @@
 """Measures of one joint: its range of motion, and its tracking error."""
 
-import collections
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
-BLOCK_NS, BLOCKS = 200_000_000, 10  # the error is over the last two seconds
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
 
 
 class Extremes:
@@ -29,36 +32,24 @@ class Extremes:
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Tracking error of a joint, over the last two seconds (rad)."""
+    """Tracking error of a joint (rad)."""
 
     rms: float
     largest: float
+    while_enabled: bool  # only those samples; False: its drive's state was not recorded, so all of them
 
 
-class TrackingError:
-    """Root mean square and largest magnitude of an error over a sliding window, in blocks of 0.2 s."""
+def tracking_error(error: Floats, state: Floats | None, enabled: Collection[float] | None) -> Error | None:
+    """Return the error over all rows in which the drive was enabled; None where there is none.
 
-    def __init__(self) -> None:
-        self._blocks: collections.deque[list[float]] = collections.deque(maxlen=BLOCKS)  # n, Σ e², max |e|
-        self._begins: collections.deque[int] = collections.deque(maxlen=BLOCKS)
-
-    def take(self, stamp_ns: int, error: float) -> None:
-        """Take one sample (rad): target − position, as the drive's following error (60F4h) is."""
-        begins = self._begins
-        if not begins or not 0 <= stamp_ns - begins[-1] < BLOCK_NS:
-            begins.append(stamp_ns)
-            self._blocks.append([0.0, 0.0, 0.0])
-        block = self._blocks[-1]
-        block[0] += 1.0
-        block[1] += error * error
-        block[2] = max(block[2], abs(error))
-
-    def at(self, now_ns: int) -> Error | None:
-        """Return the error at `now_ns`, None where the window is empty."""
-        window_ns = BLOCKS * BLOCK_NS
-        pairs = zip(self._begins, self._blocks, strict=True)
-        fresh = [block for began_ns, block in pairs if 0 <= now_ns - began_ns <= window_ns]
-        if not fresh:
-            return None
-        rms = math.sqrt(sum(block[1] for block in fresh) / sum(block[0] for block in fresh))
-        return Error(rms, max(block[2] for block in fresh))
+    `error` (rad) and `state` are as long, NaN where there is no value; `enabled` are the numbers of a state
+    in which it follows its target, None: they were not recorded.
+    """
+    known = ~np.isnan(error)
+    if enabled is not None:
+        known &= False if state is None else np.isin(state, list(enabled))
+    counted = error[known]
+    if not len(counted):
+        return None
+    rms, largest = float(np.sqrt(np.mean(counted**2))), float(np.max(np.abs(counted)))
+    return Error(rms, largest, enabled is not None)

@@ -1,7 +1,8 @@
 """Component-processing over a recording: the same events and measures as live, for a whole session."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -9,10 +10,9 @@ import numpy.typing as npt
 from server_gui.core.processing.component import ComponentProcessing
 from server_gui.core.processing.gait_events import GaitEvent, Leg
 from server_gui.core.processing.gait_measures import Gait, Stride, summary
-from server_gui.core.processing.joint_measures import Error
-from server_gui.core.processing.wiring import Wiring
+from server_gui.core.processing.joint_measures import Error, Floats, tracking_error
+from server_gui.core.processing.wiring import POSITION, STATE, Wiring
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 ROWS = 8192  # at a time
 
@@ -24,14 +24,18 @@ class RecordedGait:
     events: list[GaitEvent]
     strides: list[Stride]
     gait: Gait
-    errors: Mapping[str, Error]  # of joints that tell a following error, over all rows
+    errors: Mapping[str, Error | None]  # of joints that tell one; None: never while its drive was enabled
 
 
-def summarise(stamps_ns: Ints, columns: Mapping[str, Floats]) -> RecordedGait:
+def summarise(
+    stamps_ns: Ints,
+    columns: Mapping[str, Floats],
+    enabled: Mapping[str, Collection[float]] = MappingProxyType({}),
+) -> RecordedGait:
     """Summarise rows of one robot, given in the order of time.
 
     `stamps_ns` are on the robot's monotonic clock; `columns` are as long, by channel, NaN where there is no
-    value.
+    value. `enabled` has of each channel that is a drive's state the numbers that mean *operation enabled*.
     """
     wiring = Wiring.of(list(columns))
     used = {name: columns[name] for name in sorted(wiring.channels)}
@@ -45,9 +49,21 @@ def summarise(stamps_ns: Ints, columns: Mapping[str, Floats]) -> RecordedGait:
         events += found.events
         strides += found.strides
     by_leg = {leg: [stride for stride in strides if stride.leg is leg] for leg in Leg}
-    errors = {name.component: _error(columns[name.channel]) for name in wiring.errors}
-    known = {name: error for name, error in errors.items() if error is not None}
-    return RecordedGait(events, strides, summary(by_leg), known)
+    errors = {
+        joint: tracking_error(error, columns.get(state := f"{joint}.{STATE}"), enabled.get(state))
+        for joint, error in _errors(wiring, columns)
+        if not np.isnan(error).all()
+    }
+    return RecordedGait(events, strides, summary(by_leg), errors)
+
+
+def _errors(wiring: Wiring, columns: Mapping[str, Floats]) -> Iterator[tuple[str, Floats]]:
+    """Yield each joint's following error (60F4h), or target − position where it tells none."""
+    for channel, joint in wiring.errors:
+        yield joint, columns[channel]
+    for channel, joint in wiring.targets:
+        if (position := columns.get(f"{joint}.{POSITION}")) is not None:
+            yield joint, columns[channel] - position
 
 
 def _with_none(column: Floats) -> list[float | None]:
@@ -55,10 +71,3 @@ def _with_none(column: Floats) -> list[float | None]:
     for place in np.flatnonzero(np.isnan(column)):
         values[place] = None
     return values
-
-
-def _error(column: Floats) -> Error | None:
-    known = column[~np.isnan(column)]
-    if not len(known):
-        return None
-    return Error(float(np.sqrt(np.mean(known**2))), float(np.max(np.abs(known))))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from server_gui.core.processing.gait_events import Leg
 
 FORCE, PITCH_RATE, POSITION, TILT = "force", "angular_velocity_y", "position", "tilt_forward"
-FOLLOWING_ERROR, TARGET = "following_error", "target_position"
+FOLLOWING_ERROR, TARGET, STATE = "following_error", "target_position", "state"
 ANGLES = tuple(f"{leg}_{joint}.{POSITION}" for leg in Leg for joint in ("hip", "knee"))
 TRUNK = len(ANGLES)  # the place of the trunk's forward tilt
 
@@ -29,13 +29,14 @@ class Wiring:
     positions: tuple[Fed, ...]  # of every joint
     errors: tuple[Fed, ...]
     targets: tuple[Fed, ...]  # of joints that tell no following error
+    states: tuple[Fed, ...]  # of the drives of those that tell an error or a target
 
     @classmethod
     def of(cls, channels: Sequence[str]) -> "Wiring":
         """Return the wiring of these channels, each named `component.quantity`."""
         fed = [(Fed(channel, component), quantity) for channel, component, quantity in map(_split, channels)]
-        having = {name for name, quantity in fed if quantity == FOLLOWING_ERROR}
-        told = {name.component for name in having}
+        told = {name.component for name, quantity in fed if quantity == FOLLOWING_ERROR}
+        followers = {name.component for name, quantity in fed if quantity in (FOLLOWING_ERROR, TARGET)}
 
         def all_with(quantity: str) -> tuple[Fed, ...]:
             return tuple(name for name, found in fed if found == quantity)
@@ -51,14 +52,15 @@ class Wiring:
             positions=all_with(POSITION),
             errors=all_with(FOLLOWING_ERROR),
             targets=tuple(name for name in all_with(TARGET) if name.component not in told),
+            states=tuple(name for name in all_with(STATE) if name.component in followers),
         )
 
     @property
     def channels(self) -> set[str]:
         """Every channel that something is derived from."""
-        told = (*(name for _, name in self.forces + self.pitch_rates), *self.positions, *self.errors)
-        targets = {name.channel for name in self.targets}
-        return {name.channel for name in told} | {channel for _, channel in self.angles} | targets
+        of_joints = (*self.positions, *self.errors, *self.targets, *self.states)
+        told = (*(name for _, name in self.forces + self.pitch_rates), *of_joints)
+        return {name.channel for name in told} | {channel for _, channel in self.angles}
 
 
 def leg_of(component: str) -> Leg | None:

@@ -3,8 +3,6 @@
 import math
 import tracemalloc
 
-import pytest
-
 from server_gui.core.processing.component import ComponentProcessing
 from server_gui.core.processing.gait_events import EventSource, Leg
 from tests.unit.processing.footfalls import force, pitch_rate, stamps
@@ -26,25 +24,6 @@ def test_a_robot_without_anything_derives_nothing() -> None:
     shown = ComponentProcessing().shown()
     assert not shown.gait.walking
     assert shown.sources == {Leg.LEFT: None, Leg.RIGHT: None}
-
-
-def test_following_error_is_told_for_each_joint() -> None:
-    processing = ComponentProcessing()
-    for stamp_ns in stamps(3.0):
-        processing.take([stamp_ns], row(stamp_ns / 1e9))
-    errors = processing.shown().errors
-    assert set(errors) == set(JOINTS)
-    assert errors["left_hip"].rms == pytest.approx(0.02)
-
-
-def test_a_target_without_a_following_error_is_compared_with_the_position() -> None:
-    processing = ComponentProcessing()
-    columns: dict[str, list[float | None]] = {
-        "elbow.position": [0.1, None],
-        "elbow.target_position": [0.4, 0.4],
-    }
-    processing.take([1, 2], columns)
-    assert processing.shown().errors["elbow"].largest == pytest.approx(0.3)
 
 
 def test_an_insole_that_is_not_trusted_gives_no_events() -> None:

@@ -1,10 +1,20 @@
 """Range of motion and tracking error of one joint."""
 
 import math
+from typing import Any
 
+import numpy as np
 import pytest
 
-from server_gui.core.processing.joint_measures import Extremes, TrackingError
+from server_gui.core.processing.joint_measures import Error, Extremes, tracking_error
+from server_gui.core.processing.recording import summarise
+
+ON, OFF, NAN = 4.0, 2.0, math.nan  # states of a drive
+
+
+def told(error: Error | None) -> tuple[Any, ...]:
+    assert error is not None
+    return error.rms, error.largest, error.while_enabled
 
 
 def test_extremes_are_those_since_the_last_end() -> None:
@@ -17,19 +27,33 @@ def test_extremes_are_those_since_the_last_end() -> None:
     assert extremes.end() == 0.0
 
 
-def test_error_is_over_the_last_two_seconds() -> None:
-    error = TrackingError()
-    for step in range(1000):
-        error.take(step * 10_000_000, 0.5 if step < 500 else 0.1 * math.sin(step))
-    found = error.at(9_990_000_000)
-    assert found is not None
-    assert found.rms == pytest.approx(0.1 / math.sqrt(2), rel=0.02)
-    assert found.largest == pytest.approx(0.1, rel=0.01)
+def test_a_tracking_error_is_that_of_times_in_which_the_drive_was_enabled() -> None:
+    error = np.array([0.9, 0.1, NAN, -0.1, 0.9, 0.9])
+    state = np.array([OFF, ON, ON, ON, OFF, NAN])
+    found = tracking_error(error, state, {ON})
+    assert told(found) == (pytest.approx(0.1), pytest.approx(0.1), True)
+    assert tracking_error(error, np.full(6, OFF), {ON}) is None
+    assert tracking_error(error, None, {ON}) is None, "its state was to be recorded, and was not"
 
 
-def test_an_error_that_is_not_told_any_more_is_gone() -> None:
-    error = TrackingError()
-    error.take(0, 0.1)
-    assert error.at(100_000_000) is not None
-    assert error.at(5_000_000_000) is None
-    assert TrackingError().at(0) is None
+def test_an_error_of_a_drive_whose_states_nobody_knows_says_so() -> None:
+    found = tracking_error(np.array([0.3, NAN, -0.4]), np.array([ON, OFF, OFF]), None)
+    assert told(found) == (pytest.approx(math.sqrt(0.125)), pytest.approx(0.4), False)
+
+
+def test_the_error_of_a_joint_is_what_its_drive_tells_else_target_minus_position() -> None:
+    columns = {
+        "elbow.position": np.array([0.1, NAN, 0.1]),
+        "elbow.target_position": np.array([0.4, 0.9, 0.9]),
+        "elbow.state": np.array([ON, ON, OFF]),
+        "knee.position": np.array([0.1, 0.1, 0.1]),
+        "knee.target_position": np.array([0.4, 0.9, 0.9]),
+        "knee.following_error": np.array([0.02, 0.02, 0.02]),
+        "knee.state": np.array([OFF, OFF, OFF]),
+        "hip.following_error": np.array([NAN, NAN, NAN]),
+    }
+    enabled = {"elbow.state": {ON}, "knee.state": {ON}}
+    found = summarise(np.arange(3, dtype=np.int64), columns, enabled).errors
+    assert told(found["elbow"]) == (pytest.approx(0.3), pytest.approx(0.3), True)
+    assert found.keys() == {"elbow", "knee"}
+    assert found["knee"] is None
