@@ -12,7 +12,7 @@ from gateway.amounts import NONE
 from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
 from gateway.cli.describe_problems import summary
-from gateway.cli.text import budget, exact, say, say_json, table
+from gateway.cli.text import PAGE, budget, exact, say, say_json, table
 from gateway.client.blocking import Robot
 from gateway.client.held_controllers import HELD, held_channels, holding_channels
 from gateway.wire.bus import CLOSED
@@ -21,7 +21,6 @@ from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo, Hello
 from gateway.wire.stop import StopInfo
 
-PAGE = 100  # columns
 LOAD_S, LOOK_S = 2.0, 0.2  # how long a bus that has just been opened is given, and how often it is looked
 
 

@@ -1,15 +1,22 @@
 """The part of `gwrms describe` that tells of buses, emergency messages, and what was found."""
 
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Final
 
 from drivers.bus.boot_diagnosis import OVERLOAD_PERCENT
+from drivers.bus.health import BUSY
+from drivers.bus.traffic import NAMED, OTHER
 from drivers.error_codes import error_check
-from gateway.amounts import NONE, percent
-from gateway.cli.text import table
-from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.amounts import NONE, counted, percent
+from gateway.cli.text import PAGE, table
+from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo, identifier_text
 from gateway.wire.component import ComponentInfo
 from gateway.wire.finding import FindingInfo
 from gateway.wire.robot import Description
+
+TOLD: Final = 5  # kinds of frames of a busy bus, each of a node
+TO_NODES: Final = ("RPDO", "SDO request")  # somebody sends these to the node
 
 
 def chapters(robot: Description) -> Iterator[str]:
@@ -20,6 +27,7 @@ def chapters(robot: Description) -> Iterator[str]:
             [_bus(bus) for bus in robot.buses],
             right=range(2, 7),
         )
+        yield from (_traffic(bus) for bus in robot.buses if bus.talks and _is_busy(bus))
         yield table(
             ("NODE", "COMPONENTS", "SDO p50", "SDO max", "SENT", "UNANSWERED", "LATE", "PDOs MISSING"),
             [_node(bus, node) for bus in robot.buses for node in bus.nodes],
@@ -56,6 +64,30 @@ def _overload(bus: BusInfo) -> str:
     return (
         f"the bus is overloaded: {load:.0f} % of its time is taken, and what its nodes lack may come of that"
     )
+
+
+def _is_busy(bus: BusInfo) -> bool:
+    return (bus.load_percent or 0.0) >= BUSY
+
+
+def _traffic(bus: BusInfo) -> str:
+    """Return what takes a bus's time, the most first, with its identifiers and whose it is."""
+    names = {node.node_id: ", ".join(node.components) for node in bus.nodes}
+    told = [f"{_talk(talk, names)}: {talk.frames_per_s:.0f} frames/s" for talk in bus.talks[:TOLD]]
+    more = len(bus.talks) - len(told)
+    text = f"on {bus.name}: {'; '.join(told)}" + (f"; and {counted(more, 'other kind')}" if more else "")
+    return textwrap.fill(text, PAGE, subsequent_indent="  ") + "\n"
+
+
+def _talk(talk: TalkInfo, names: Mapping[int, str]) -> str:
+    """Return `TPDO of left_knee 0x182, 0x282`."""
+    if talk.node_id is None:
+        whose = f"{talk.kind} of no known node" if talk.kind == OTHER else talk.kind
+    else:
+        to_or_of = "to" if talk.kind in TO_NODES else "of"
+        whose = f"{talk.kind} {to_or_of} {names.get(talk.node_id) or f'node {talk.node_id}'}"
+    more = [] if len(talk.identifiers) < NAMED else ["…"]
+    return f"{whose} {', '.join([*map(identifier_text, talk.identifiers), *more])}".rstrip()
 
 
 def _strangers(bus: BusInfo) -> str:

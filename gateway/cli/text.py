@@ -13,6 +13,7 @@ from gateway.plain_text import json_plain, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.cost import BudgetInfo
 
+PAGE: Final = 100  # columns of a text that is filled
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole
 OTHER_DECIMALS = 4
 YES_OR_NO: Final = " [y/N] "  # ends a question; its answer is typed after it

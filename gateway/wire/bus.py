@@ -69,5 +69,11 @@ class Buses(Struct, frozen=True):
     buses: list[BusInfo]
 
 
+def identifier_text(identifier: int) -> str:
+    """Return an identifier as it is written: one of 29 bits with eight digits."""
+    plain = f"0x{identifier & ~(EXTENDED | REMOTE):0{8 if identifier & EXTENDED else 3}X}"
+    return f"{plain} (remote request)" if identifier & REMOTE else plain
+
+
 BUS_SNAPSHOT = Method("bus.snapshot", Params, Buses, module="component", role=Role.VIEWER)
 METHODS = (BUS_SNAPSHOT,)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.wire.bus import EXTENDED, REMOTE, BusInfo
+from gateway.wire.bus import BusInfo, identifier_text
 
 OWN_KINDS: Final = frozenset({"EMCY", "TPDO", "SDO answer", "heartbeat"})  # that a node sends itself
 OTHER: Final = "other"  # of no kind that CiA 301 names
@@ -40,8 +40,8 @@ class Talking:
         """Name the identifiers, of 29 bits with eight digits; of many the lowest and the highest."""
         known = sorted(self.identifiers)
         if len(known) > MOST_IDS:
-            return f"{_hex(known[0])} … {_hex(known[-1])}"
-        return ", ".join(map(_hex, known)) + (", …" if self.has_more else "")
+            return f"{identifier_text(known[0])} … {identifier_text(known[-1])}"
+        return ", ".join(map(identifier_text, known)) + (", …" if self.has_more else "")
 
     @property
     def who(self) -> str:
@@ -137,11 +137,6 @@ def whole_numbers(rates: Sequence[float], of: float) -> list[int]:
 def _rest(bus: BusInfo) -> float:
     """Return the frames a second that did not come to the gateway; 0 where nothing is known of the others."""
     return max((total(bus) or 0.0) - sum(one.frames_per_s for one in bus.talks), 0.0) if bus.talks else 0.0
-
-
-def _hex(identifier: int) -> str:
-    plain = f"0x{identifier & ~(EXTENDED | REMOTE):0{8 if identifier & EXTENDED else 3}X}"
-    return f"{plain} (remote request)" if identifier & REMOTE else plain
 
 
 def _order(one: Talking) -> tuple[int, bool, int, str]:

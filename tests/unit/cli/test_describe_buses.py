@@ -7,7 +7,8 @@ import pytest
 
 from gateway.cli import describe
 from gateway.cli.describe_buses import chapters
-from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
+from gateway.cli.text import PAGE
+from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.component import ComponentInfo, EmcyInfo
 from gateway.wire.finding import FindingInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
@@ -92,3 +93,30 @@ def test_an_overloaded_bus_says_so_in_its_own_row() -> None:
     assert "the bus is overloaded: 101 % of its time is taken" in row
     other = next(chapter for chapter in chapters(described(BUS)) if "LOAD" in chapter)
     assert "overloaded" not in other
+
+
+TALKS = [
+    TalkInfo("other", None, 5210.4, [0x7FF, 0x18FF00E5 | 1 << 31]),
+    TalkInfo("TPDO", 2, 800.0, [0x182, 0x282, 0x382, 0x482]),
+    TalkInfo("RPDO", 2, 400.0, [0x202]),
+    TalkInfo("SDO request", 9, 300.0, [0x609]),
+    TalkInfo("SYNC", None, 200.0, [0x080]),
+    TalkInfo("heartbeat", 2, 10.0, [0x702]),
+]
+
+
+def test_a_busy_bus_names_the_identifiers_that_take_its_time_and_whose_they_are() -> None:
+    busy = msgspec.structs.replace(BUS, talks=TALKS)
+    told = next(chapter for chapter in chapters(described(busy)) if chapter.startswith("on main: "))
+    assert max(map(len, told.splitlines())) <= PAGE
+    assert " ".join(told.split()) == (
+        "on main: other of no known node 0x7FF, 0x18FF00E5: 5210 frames/s; "
+        "TPDO of left_knee 0x182, 0x282, 0x382, 0x482, …: 800 frames/s; "
+        "RPDO to left_knee 0x202: 400 frames/s; "
+        "SDO request to node 9 0x609: 300 frames/s; SYNC 0x080: 200 frames/s; and 1 other kind"
+    )
+
+
+def test_a_bus_with_room_names_none() -> None:
+    for free in (msgspec.structs.replace(BUS, talks=TALKS, load_percent=40.0), BUS):
+        assert "on main: " not in "\n".join(chapters(described(free)))
