@@ -6,13 +6,14 @@ from contextlib import contextmanager
 from types import FrameType
 
 from drivers.errors import DriverError
-from gateway.cli.text import say, say_json
+from gateway.cli.text import say, say_json, table
 from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
 from gateway.commission.draft import Draft
 from gateway.commission.stopping import Stopped, stop, stop_all
 from gateway.config.robot import RobotConfig
 
+NOT_SAID = "not known"  # of a state
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -23,10 +24,10 @@ def stop_drives(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
 
 def stop_robot(config: RobotConfig, benches: Mapping[str, CanBench], *, as_json: bool) -> int:
     """Quick stop to every joint of a robot's file, each on its own bus; likewise."""
-    axes: dict[str, set[Axis]] = {}
-    for joint in config.joint.values():
-        axes.setdefault(joint.bus, set()).add(Axis(joint.node_id, joint.axis))
-    buses = {name: (benches[name], found) for name, found in axes.items()}
+    axes: dict[str, dict[Axis, str]] = {}
+    for name, joint in config.joint.items():
+        axes.setdefault(joint.bus, {})[Axis(joint.node_id, joint.axis)] = name
+    buses = {bus: (benches[bus], found) for bus, found in axes.items()}
     return _stop(lambda: stop_all(buses), benches.values(), as_json=as_json)
 
 
@@ -42,10 +43,27 @@ def _stop(ask: Callable[[], Stopped], benches: Iterable[CanBench], *, as_json: b
             bench.close()
     if as_json:
         told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
-        say_json({"stopped": {**told, "states": stopped.states, "after_ms": stopped.after_ms}})
+        proofs = {"states": stopped.states, "after_ms": stopped.after_ms, "joints": stopped.joints}
+        say_json({"stopped": {**told, **proofs}})
     else:
-        say(stopped.words + "\n")
+        say(stopped.words + "\n" + _drives(stopped))
     return 0 if stopped.confirmed else 1
+
+
+def _drives(stopped: Stopped) -> str:
+    """Return a row a drive: its joint, its state as it has said last, and after how long it confirmed."""
+    rows = [
+        (stopped.joints.get(drive, ""), drive, stopped.states.get(drive, NOT_SAID), _when(stopped, drive))
+        for drive in stopped.drives
+    ]
+    return table(("JOINT", "DRIVE", "STATE", "CONFIRMED"), rows) if rows else ""
+
+
+def _when(stopped: Stopped, drive: str) -> str:
+    after_ms = stopped.after_ms.get(drive)
+    if after_ms is None:
+        return f"NOT CONFIRMED: {stopped.drives[drive]}"
+    return f"after {max(after_ms, 1.0):.0f} ms"
 
 
 class MotionEnded(KeyboardInterrupt):

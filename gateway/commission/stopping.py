@@ -59,15 +59,19 @@ class Stopped:
     problem: str = ""  # of the bus, or why there may be other drives
     states: Mapping[str, str] = field(default_factory=dict)  # of drives that have said theirs
     after_ms: Mapping[str, float] = field(default_factory=dict)  # of drives that have confirmed it
+    joints: Mapping[str, str] = field(default_factory=dict)  # of drives whose joint has a name
 
     @classmethod
-    def of(cls, found: Mapping[str, DriveStopped], problem: str = "") -> "Stopped":
-        """Return the result from what is known of each drive."""
+    def of(
+        cls, found: Mapping[str, DriveStopped], problem: str = "", joints: Mapping[str, str] | None = None
+    ) -> "Stopped":
+        """Return the result from what is known of each drive, and the names of their `joints`."""
         return cls(
             {name: one.outcome for name, one in found.items()},
             problem,
             {name: one.state for name, one in found.items() if one.state is not None},
             {name: one.after_ms for name, one in found.items() if one.after_ms is not None},
+            joints or {},
         )
 
     @property
@@ -103,24 +107,26 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
         DriverError: the bus does not open.
 
     """
-    drafted, written = set(axes_of(draft)), _axes_in(draft.file)
-    known = drafted | (written or set())
+    drafted, written = set(axes_of(draft)), _joints_in(draft.file)
+    known = drafted | (written or {}).keys()
     found = _stopped(bench, known, every=draft.path.exists())
     is_open = (not drafted and draft.path.exists()) or written is None
     problem = OTHERS if is_open and known else ""
     if written is None and not known:
         problem = f"{draft.file} {UNREADABLE}"
-    return Stopped.of({str(axis): one for axis, one in found.items()}, problem)
+    names = {str(axis): name for axis, name in ((written or {}) | _joints_of(draft)).items()}
+    return Stopped.of({str(axis): one for axis, one in found.items()}, problem, names)
 
 
-def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
+def stop_all(buses: Mapping[str, tuple[CanBench, Mapping[Axis, str]]]) -> Stopped:
     """Stop the drives of several buses, all at once: one that is dead keeps no other waiting.
 
-    Drives of a bus that does not open, or fails meanwhile, are not reached.
+    Each drive comes with its joint. Those of a bus that does not open, or fails meanwhile, are not reached.
     """
     if not buses:
         return Stopped({}, NO_DRIVE)
     drives: dict[str, DriveStopped] = {}
+    joints: dict[str, str] = {}
     problems: list[str] = []
     with ThreadPoolExecutor(len(buses), "stop") as pool:
         stopping = {name: pool.submit(_stopped, *of) for name, of in buses.items()}
@@ -135,7 +141,8 @@ def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
             found = dict.fromkeys(buses[name][1], UNREACHED)
         where = f" on {name}" if len(buses) > 1 else ""
         drives |= {f"{axis}{where}": one for axis, one in found.items()}
-    return Stopped.of(drives, "; ".join(problems))
+        joints |= {f"{axis}{where}": joint for axis, joint in buses[name][1].items()}
+    return Stopped.of(drives, "; ".join(problems), joints)
 
 
 def _stopped(bench: CanBench, known: Collection[Axis], *, every: bool = False) -> dict[Axis, DriveStopped]:
@@ -155,19 +162,28 @@ def axes_of(draft: Draft) -> Iterator[Axis]:
         kind, _, name = table.partition(".")
         if kind == "node" and name.isdecimal() and draft.has(table, "identity"):
             yield Axis(int(name))
-        elif kind == "joint" and draft.has(table, "node_id"):
-            yield Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0))
+    yield from _joints_of(draft)
 
 
-def _axes_in(file: Path) -> set[Axis] | None:
-    """Return the joints of a robot's file; None where there is one, and it does not say them."""
+def _joints_of(draft: Draft) -> dict[Axis, str]:
+    """Return the names of the joints that were found until now, by their axes."""
+    return {
+        Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0)): name
+        for table in draft.tables
+        if table.startswith("joint.") and draft.has(table, "node_id")
+        for name in [table.removeprefix("joint.")]
+    }
+
+
+def _joints_in(file: Path) -> dict[Axis, str] | None:
+    """Return the joints of a robot's file by axis; None where there is one, and it does not say them."""
     if not file.exists():
-        return set()
+        return {}
     try:
         joints = msgspec.toml.decode(file.read_bytes(), type=_File).joint
     except (OSError, ValueError, msgspec.MsgspecError):
         return None
-    return {Axis(one.node_id, one.axis) for one in joints.values()}
+    return {Axis(one.node_id, one.axis): name for name, one in joints.items()}
 
 
 def _request(axis: Axis) -> bytes:

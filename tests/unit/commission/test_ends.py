@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -164,6 +165,31 @@ def test_a_stop_reaches_the_drives_of_every_bus_and_one_that_has_the_same_number
     assert told["drives"] == {"node 5 on one": "unreachable", "node 5 on two": "confirmed"}
     assert told["states"] == {"node 5 on two": "switch on disabled"}
     assert list(told["after_ms"]) == ["node 5 on two"], "no time where nothing was confirmed"
+    assert told["joints"] == {"node 5 on one": "left_knee", "node 5 on two": "right_knee"}
+
+
+@pytest.mark.usefixtures("signals")
+def test_a_stop_in_the_terminal_has_a_row_a_drive_with_its_joint_state_and_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It named the nodes in one line, without what they had said."""
+    file = tmp_path / "exo-01.toml"
+    file.write_text("[joint.left_knee]\nnode_id = 5\n[joint.right_knee]\nnode_id = 6\n")
+    draft = Draft(file)
+    draft.put("joint.left_hip", "node_id", 7)
+    with (
+        HomingDrive("rows", 5, state=S.OPERATION_ENABLED),
+        HomingDrive("rows", 7, state=S.READY_TO_SWITCH_ON),
+    ):
+        assert main(["commission", "--stop", str(file), "virtual:rows"]) == 1
+    first, *table = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert first == "NOT CONFIRMED: node 6 is unreachable"
+    assert [re.sub(r"\d+ ms", "N ms", row) for row in table] == [
+        "JOINT DRIVE STATE CONFIRMED",
+        "left_knee node 5 switch on disabled after N ms",
+        "right_knee node 6 not known NOT CONFIRMED: unreachable",
+        "left_hip node 7 switch on disabled after N ms",
+    ]
 
 
 def test_an_interface_that_fails_hides_nothing_of_the_drives_of_another_bus(
@@ -179,7 +205,7 @@ def test_an_interface_that_fails_hides_nothing_of_the_drives_of_another_bus(
     monkeypatch.setattr(bad, "send_urgent", fail)
     with HomingDrive(channel, 5, state=S.OPERATION_ENABLED) as drive:
         try:
-            stopped = stop_all({"one": (good, {Axis(5)}), "two": (bad, {Axis(6)})})
+            stopped = stop_all({"one": (good, {Axis(5): "left_knee"}), "two": (bad, {Axis(6): "right_knee"})})
         finally:
             good.close()
             bad.close()
