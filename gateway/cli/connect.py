@@ -105,7 +105,8 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
         return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
     except Unreachable as error:
         if (unknown := _unknown_name(address)) and not isinstance(error, WrongRobot):
-            raise Unreachable(f"{unknown} If it is a computer: {error}") from error
+            is_clear = _in_other_case(address.host)
+            raise Unreachable(unknown if is_clear else f"{unknown} If it is a computer: {error}") from error
         if address != USUAL:
             raise
         raise Unreachable(followed(str(error), "Another robot: --robot HOST:PORT")) from error
@@ -117,8 +118,15 @@ def _unknown_name(address: Address) -> str:
     if address.called or address.path or word == "localhost" or not _WORD.fullmatch(word):
         return ""
     known = robot_names()
+    if alike := _in_other_case(word):
+        return f"no robot is called {word!r}; did you mean {' or '.join(alike)}?"
     listed = f" (it has {', '.join(known)})." if known else "."
     return f"no robot is called {word!r} in {server_file()}{did_you_mean(word, known) or listed}"
+
+
+def _in_other_case(word: str) -> list[str]:
+    """Return the robots in the server's file whose names differ from a word by capitals alone."""
+    return [name for name in robot_names() if name.casefold() == word.casefold()]
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:

@@ -52,6 +52,15 @@ def test_a_name_that_no_robot_has_is_said_to_be_one(
     assert "server.toml (it has exo-01). If it is" in capsys.readouterr().err
 
 
+def test_a_name_in_other_capitals_is_said_in_one_short_sentence(
+    listed: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    listed('exoskeleton = "192.0.2.7:7420"\nexo-02 = "192.0.2.8:7420"\n')
+    assert main(["describe", "--robot", "EXOSKELETON"]) == 1
+    said = capsys.readouterr().err
+    assert said == "gwrms describe: no robot is called 'EXOSKELETON'; did you mean exoskeleton?\n"
+
+
 def test_a_controller_is_not_listed_as_a_drive(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
     answer: dict[str, object] = {"drives": dict.fromkeys(JOINTS, "confirmed"), "held": True}
     robot.overrides["robot.stop"] = lambda params: answer
