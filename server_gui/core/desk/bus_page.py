@@ -20,7 +20,8 @@ FEW: Final = 2  # lines of one kind
 BEFORE: Final = "silent by now"  # names the frames of the last second that are of nodes without a number
 FILLS: Final = "most of the load"
 SILENT: Final = frozenset({"lost", "stale"})
-UNANSWERED, FEW_PDOS = "no SDO answer", "PDOs missing"
+UNANSWERED: Final = Mark("triangle", "warn", "no SDO answer")
+FEW_PDOS: Final = Mark("cross", "warn", "PDOs missing")  # as a gap of a recording; ▲ has a confirmed STOP
 _HEARTBEAT: Final = re.compile(r"heartbeat has been missing for (\d+(?:\.\d+)? \w+)")
 _WORST: Final = ("bad", "warn")
 
@@ -159,15 +160,15 @@ def _mark(node: NodeInfo | None, talk: Talking | None, alarms: Alarms, *, live: 
     if worst is not None:
         return worst.mark
     if node_level(node) is not BusHealthLevel.GOOD:
-        return Mark("triangle", "warn", _found(node))
+        return _found(node)
     is_known = talk is not None or node.sdo_p50_ms is not None
     return STATES["ok"] if live and is_known else NOT_KNOWN
 
 
-def _found(node: NodeInfo) -> str:
+def _found(node: NodeInfo) -> Mark:
     if any("no SDO" in one.words for one in node.findings):
         return UNANSWERED
-    return FEW_PDOS if told_percent(node) else TEXTS[Kind.REPORTS].mark.word
+    return FEW_PDOS if told_percent(node) else TEXTS[Kind.REPORTS].mark
 
 
 def _row(

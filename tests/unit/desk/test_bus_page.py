@@ -7,8 +7,10 @@ from msgspec.structs import replace
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
 from server_gui.core.alarms.alarm import Active, Alarm, Alarms
+from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.bus_page import BEFORE, Row, lines, rows, told_kinds
+from server_gui.core.desk.stop_all import SENT, STOPPED
 from server_gui.core.follow.robot import FollowedComponent
 
 HIP = NodeInfo(1, ["left_hip"], 0.4, 1.0, 88, 0, 0, 0.0)
@@ -73,6 +75,15 @@ def test_the_worst_node_stands_first() -> None:
         ("gait", "warn"),
         ("left hip", "text"),
     ]
+
+
+def test_missing_pdos_have_a_mark_of_their_own() -> None:
+    """It was that of a STOP that is confirmed."""
+    missing = replace(BUS, nodes=[replace(HIP, pdos_missing_percent=4.0), KNEE, GAIT])
+    mark = by_name(rows(missing, PARTS, told(), live=True))["left hip"].mark
+    assert mark is not None
+    assert (mark.word, mark.colour) == ("PDOs missing", "warn")
+    assert mark.shape not in (STOPPED.shape, SENT.shape, STATES["ok"].shape)
 
 
 def test_what_fills_a_busy_bus_stands_before_what_suffers_from_it() -> None:
