@@ -1,7 +1,9 @@
 """The bus's view: a full bus is an alarm, what is not known is said so, and the last line names the worst."""
 
+import re
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.refresh_rate import SLOW
-from server_gui.views.resources.bus_card import FRAMES, SENDER, STATE, controller_text
+from server_gui.views.resources.bus_card import FRAMES, SENDER, SPARE, STATE, TITLES, controller_text
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.resources.load_bar import LoadBar
 from server_gui.views.theme import Theme
@@ -278,3 +280,12 @@ def test_few_frames_a_second_are_a_busy_computer_on_the_last_line(
     is_busy = "busy" in said
     assert all("busy" in wording for wording in bar._window._wordings[:2]) is is_busy
     assert all("▲" in wording for wording in bar._window._wordings) is is_busy
+
+
+def test_the_page_of_the_window_lists_the_columns_and_the_order_in_which_they_go() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "window.md").read_text(encoding="utf-8")
+    table = page.partition("| column | |\n|---|---|\n")[2].partition("\n\n")
+    listed = [line.split("|")[1].strip() for line in table[0].splitlines()]
+    assert tuple(listed) == TITLES
+    order = re.findall(r"\*([^*]+)\*", table[2].partition("in this order: ")[2].partition("\n")[0])
+    assert order == [TITLES[column] for column in SPARE]
