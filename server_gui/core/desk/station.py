@@ -65,6 +65,7 @@ from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
+STATES_S: Final = 5.0  # of an older row nobody says which drives were off before a STOP; late rows correct it
 
 
 class Station:
@@ -309,7 +310,9 @@ class Station:
     def send_stop(self, reason: str) -> Sent:
         """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
         at_ns, future = time.monotonic_ns(), self._commands.stop(reason)
-        joints = self.robot.names("joint") if self.is_live else ()
+        age_s = self.robot.age_s()
+        is_known = self.is_linked and age_s is not None and age_s <= STATES_S
+        joints = self.robot.names("joint") if is_known else ()
         off = {joint for joint in joints if is_off(self.robot.word(f"{joint}.state"))}
         return Sent(at_ns, future, off)
 

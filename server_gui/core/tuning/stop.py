@@ -97,7 +97,7 @@ class StopProgress:
     drives: int = 0  # that have confirmed it
     silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
-    _off: Collection[str] = ()  # drives that were not enabled when it was sent
+    _off: set[str] = field(default_factory=set)  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
     _clock: ClockOffset | None = None  # of the robot when it was sent
     _boot_id: str | None = None  # likewise
@@ -129,12 +129,12 @@ class StopProgress:
         """
         self.number += 1
         if self.state is StopState.SENT:
-            self._off = set(self._off) & set(off)
+            self._off &= set(off)
         else:
             now_ns = time.monotonic_ns()
             self.at_ns = now_ns if at_ns is None else at_ns
             self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
-            self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, off, clock, boot_id, 0
+            self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, set(off), clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
         self.silent, self._confirmed, self.was_ended, self._is_written = (), (), False, False
         return self.number
@@ -254,7 +254,10 @@ class StopProgress:
     def show(
         self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
     ) -> None:
-        """Take drives' states in words; `offset_ns` is the robot's clock minus ours."""
+        """Take drives' states in words; `offset_ns` is the robot's clock minus ours.
+
+        Rows that come late say of a drive whether it was enabled before the STOP.
+        """
         if self.at_ns is None or self.state is StopState.IDLE:
             return
         for drive, words in columns.items():
@@ -267,11 +270,22 @@ class StopProgress:
         self, drive: str, stamps_ns: Sequence[int], words: Sequence[str | None], offset_ns: int, at_ns: int
     ) -> None:
         for stamp_ns, word in zip(stamps_ns, words, strict=True):
-            after_ms = (stamp_ns - offset_ns - at_ns) / 1e6
-            if after_ms >= 0.0 and word is not None and is_off(word):
-                proof = Proof(0.0 if drive in self._off else after_ms, word)
+            after_ns = stamp_ns - offset_ns - at_ns
+            if word == ENABLED:
+                self._off.discard(drive)
+            elif word is None or not is_off(word):
+                continue
+            elif after_ns < -self._sure_ns:
+                self._off.add(drive)
+            elif after_ns >= 0:
+                proof = Proof(0.0 if drive in self._off else after_ns / 1e6, word)
                 self.proofs[drive] = self._earliest(drive, proof)
                 return
+
+    @property
+    def _sure_ns(self) -> int:
+        """How much older than the STOP a row is at least, of which the clocks say that it is older."""
+        return CLOCKS_NS + (0 if self._clock is None else self._clock.uncertainty_ns)
 
     def _earliest(self, drive: str, proof: Proof) -> Proof:
         """Return its proof, no later than the answer in which the drive itself has confirmed the STOP."""
@@ -304,7 +318,7 @@ class StopProgress:
     @property
     def already_off(self) -> frozenset[str]:
         """The drives that have confirmed the latest STOP, and were off when it was sent."""
-        return self.confirmed & frozenset(self._off)
+        return self.confirmed & self._off
 
     @property
     def confirmed(self) -> frozenset[str]:

@@ -148,6 +148,45 @@ def test_a_stop_of_drives_that_are_off_already_gives_no_time() -> None:
     assert stopping.text == "STOP confirmed by all 2 drives, already off"
 
 
+def test_rows_from_before_a_stop_that_come_late_say_which_drives_were_off_already() -> None:
+    """A second STOP had a new time for drives that the first one had stopped."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=5_000_000_000), ALL, at_ns=5_095_000_000)
+    assert stopping.text.endswith("in 95 ms")
+    on, off = "operation enabled", "switch on disabled"
+    columns = {"left_knee": [on, off], "right_knee": [off, on]}
+    stopping.show([4_200_000_000, 4_700_000_000], columns, 0)
+    stopping.show([5_010_000_000], {drive: [off] for drive in ALL.drives}, 0)
+    assert stopping.already_off == {"left_knee"}
+    assert stopping.proofs["left_knee"].was_so
+    assert stopping.text == "STOP confirmed by all 2 drives in 10 ms", "that of the right knee"
+
+
+def test_a_drive_that_was_enabled_just_before_a_stop_was_not_off_already() -> None:
+    """The newest row at the STOP was of before somebody had enabled it."""
+    stopping = StopProgress()
+    number = stopping.sent(off=ALL.drives, at_ns=5_000_000_000)
+    stopping.show([4_990_000_000], {"left_knee": ["operation enabled"]}, 0)
+    stopping.show([5_020_000_000], {drive: ["switch on disabled"] for drive in ALL.drives}, 0)
+    stopping.answered(number, ALL, at_ns=5_095_000_000)
+    assert stopping.already_off == {"right_knee"}
+    assert stopping.text.endswith("in 20 ms")
+
+
+@pytest.mark.parametrize(("uncertainty_ns", "off"), [(1000, ALL.drives), (200_000_000, {})])
+def test_a_row_that_may_be_of_after_the_stop_does_not_say_that_a_drive_was_off(
+    uncertainty_ns: int, off: dict[str, str]
+) -> None:
+    stopping = StopProgress()
+    number = stopping.sent(at_ns=SENT_NS, clock=ClockOffset(0, uncertainty_ns))
+    columns = {drive: ["switch on disabled"] for drive in ALL.drives}
+    stopping.show([SENT_NS - 10_000_000], columns, 0)
+    stopping.answered(number, ALL)
+    assert stopping.already_off == frozenset()
+    stopping.show([SENT_NS - 100_000_000], columns, 0)
+    assert stopping.already_off == off.keys()
+
+
 def test_drives_that_were_enabled_since_are_proven_anew() -> None:
     """Somebody else had reset and enabled them: nobody had read that yet."""
     stopping = StopProgress()

@@ -83,6 +83,20 @@ def test_where_only_a_controller_is_silent_the_drives_are_said_to_be_off_and_it_
     assert bench.station.stopping.silent == ()
 
 
+@pytest.mark.parametrize(("age_s", "is_known"), [(2.0, True), (60.0, False)])
+def test_a_drive_that_the_newest_row_shows_off_is_off_already_though_that_row_is_late(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, age_s: float, is_known: bool
+) -> None:
+    """Where the row was older than half a second, the STOP had a time of its own for it."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 500_000_000)
+    columns: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    then_ns = time.monotonic_ns() - round(age_s * 1e9)
+    bench.station.take([telemetry([then_ns], columns, then_ns)])
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    assert bench.station.stopping.text.endswith("already off") is is_known
+
+
 def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
