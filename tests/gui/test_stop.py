@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
@@ -149,6 +149,30 @@ def test_the_result_of_stop_all_is_wholly_in_sight_beside_each_robots_own_until_
         commands.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
     bench.draw(window)
     assert bar.text == ""
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "scale"), [(1024, 700, 1.5), (1366, 768, 1.0), (1920, 1080, 1.0)]
+)
+def test_the_result_of_stop_all_moves_no_alarm_no_tab_and_no_panel(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    """It pushed all that was below the header down, each robot's Stop and Acknowledge too."""
+    bench.add("exo-02", 7421).take([described("exo-02")])
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.draw(window)
+    parts = (window.alarms, window.page_bar, window.robots.all_stop, *window.docks)
+
+    def places() -> list[object]:
+        fixed: list[object] = [(part.mapTo(window, QPoint()), part.size()) for part in parts]
+        return [*fixed, window.tabs.mapTo(window, QPoint())]
+
+    before = places()
+    bench.desk.stop_all("all")
+    bench.draw(window)
+    assert window.stopped_all.isVisible()
+    assert places() == before
 
 
 def test_shift_f12_stops_every_robot_and_f12_none_but_the_one_that_is_looked_at(

@@ -159,8 +159,8 @@ class MainWindow(QMainWindow):
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
         self.page_bar = PageBar(self.tabs, self._help_corner())
-        column.addWidget(self.experiment)
-        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
+        for row in (self.stopped_all, self.experiment, self.trial):  # below: when one comes, no tab moves
+            column.addWidget(row)
         self._build()
         self._bind_keys()
         menu.setMenu(self._view_menu())
@@ -349,7 +349,6 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(above)
         top = _column(above)
         top.addWidget(self.header)
-        top.addWidget(self.stopped_all)
         top.addWidget(self.alarms)
         top.addWidget(self.page_bar)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea

@@ -1,4 +1,4 @@
-"""What became of STOP ALL, of all robots together: one line below the header, from it until all are reset."""
+"""What became of STOP ALL, of all robots together: one line below the pages, from it until all are reset."""
 
 from typing import Final
 
