@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
@@ -173,6 +173,23 @@ def test_the_result_of_stop_all_moves_no_alarm_no_tab_and_no_panel(
     bench.draw(window)
     assert window.stopped_all.isVisible()
     assert places() == before
+
+
+def test_the_list_of_alarms_does_not_cover_the_result_of_stop_all(window: MainWindow, bench: Bench) -> None:
+    for number in range(2, 9):
+        bench.add(f"exo-0{number}", 7419 + number).take([described(f"exo-0{number}")])
+    bench.desk.stop_all("all")
+    for commands in bench.commands:
+        commands.fail(NotConnected("there is no link"))
+    window.resize(1024, 600)
+    bench.draw(window)
+    window.alarms.more.click()
+    bench.draw(window)
+    assert window.alarms.list.isVisible()
+    listed, result = (
+        QRect(part.mapToGlobal(QPoint()), part.size()) for part in (window.alarms.list, window.stopped_all)
+    )
+    assert not listed.intersects(result)
 
 
 def test_shift_f12_stops_every_robot_and_f12_none_but_the_one_that_is_looked_at(

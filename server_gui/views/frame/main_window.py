@@ -116,7 +116,10 @@ class MainWindow(QMainWindow):
         # Rooms before what is in them: Qt styles all of a widget anew wherever it is put into another.
         self._middle = QWidget()
         self.setCentralWidget(self._middle)
-        self.alarms = AlarmStrip(desk, theme, self._middle)
+        self._pages = QStackedWidget()
+        column = _column(self._middle)
+        column.addWidget(self._pages, 1)
+        self.alarms = AlarmStrip(desk, theme, self._pages)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
         self.alarms.resources.connect(self._show_resources)
@@ -137,9 +140,6 @@ class MainWindow(QMainWindow):
         self.empty.added.connect(self.added)
         self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
-        self._pages = QStackedWidget()
-        column = _column(self._middle)
-        column.addWidget(self._pages, 1)
         nobody = ScrollArea()
         self._pages.addWidget(nobody)
         nobody.setWidget(self.empty)
@@ -344,7 +344,7 @@ class MainWindow(QMainWindow):
     # --- how it is put together
 
     def _build(self) -> None:
-        self.keys = KeysSheet(self._theme, self._middle)
+        self.keys = KeysSheet(self._theme, self._pages)
         above = QWidget()
         self.setMenuWidget(above)
         top = _column(above)
