@@ -8,7 +8,7 @@ from drivers.bus.boot_diagnosis import OVERLOAD_PERCENT
 from drivers.bus.health import BUSY
 from drivers.bus.traffic import NAMED, OTHER
 from drivers.error_codes import error_check
-from gateway.amounts import NONE, counted, percent
+from gateway.amounts import NONE, percent
 from gateway.cli.text import PAGE, table
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo, identifier_text
 from gateway.wire.component import ComponentInfo
@@ -75,14 +75,14 @@ def _traffic(bus: BusInfo) -> str:
     names = {node.node_id: ", ".join(node.components) for node in bus.nodes}
     told = [f"{_talk(talk, names)}: {talk.frames_per_s:.0f} frames/s" for talk in bus.talks[:TOLD]]
     more = len(bus.talks) - len(told)
-    text = f"on {bus.name}: {'; '.join(told)}" + (f"; and {counted(more, 'other kind')}" if more else "")
+    text = f"on {bus.name}: {'; '.join(told)}" + (f"; and {more} more" if more else "")
     return textwrap.fill(text, PAGE, subsequent_indent="  ") + "\n"
 
 
 def _talk(talk: TalkInfo, names: Mapping[int, str]) -> str:
     """Return `TPDO of left_knee 0x182, 0x282`."""
     if talk.node_id is None:
-        whose = f"{talk.kind} of no known node" if talk.kind == OTHER else talk.kind
+        whose = "no known node" if talk.kind == OTHER else talk.kind
     else:
         to_or_of = "to" if talk.kind in TO_NODES else "of"
         whose = f"{talk.kind} {to_or_of} {names.get(talk.node_id) or f'node {talk.node_id}'}"

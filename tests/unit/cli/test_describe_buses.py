@@ -110,10 +110,10 @@ def test_a_busy_bus_names_the_identifiers_that_take_its_time_and_whose_they_are(
     told = next(chapter for chapter in chapters(described(busy)) if chapter.startswith("on main: "))
     assert max(map(len, told.splitlines())) <= PAGE
     assert " ".join(told.split()) == (
-        "on main: other of no known node 0x7FF, 0x18FF00E5: 5210 frames/s; "
+        "on main: no known node 0x7FF, 0x18FF00E5: 5210 frames/s; "
         "TPDO of left_knee 0x182, 0x282, 0x382, 0x482, …: 800 frames/s; "
         "RPDO to left_knee 0x202: 400 frames/s; "
-        "SDO request to node 9 0x609: 300 frames/s; SYNC 0x080: 200 frames/s; and 1 other kind"
+        "SDO request to node 9 0x609: 300 frames/s; SYNC 0x080: 200 frames/s; and 1 more"
     )
 
 
