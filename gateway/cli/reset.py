@@ -1,6 +1,7 @@
 """`gwrms reset`: ends a held stop."""
 
 import contextlib
+from collections.abc import Sequence
 
 from gateway.amounts import NONE
 from gateway.cli.connect import ask, connect, parser
@@ -20,6 +21,7 @@ LOSES = (
     "no stop is held, and under power, or not known, are: {}. A reset stops them and takes their power, "
     "and a wearer the robot's support. Go on?"
 )
+NOT_KNOWN = "{} (not known)"
 POWERED = frozenset({"switched on", "operation enabled", "quick stop active", "fault reaction active"})
 
 
@@ -35,7 +37,7 @@ def main(argv: list[str]) -> int:
             if not ask(LOSES.format(", ".join(powered)), yes=False):
                 warn("reset", "nothing was done")
                 return 1
-            if robot.describe().stop.held:
+            if _is_stopped(robot):
                 warn("reset", "somebody has stopped the robot meanwhile: nothing was done")
                 return 1
         reset = robot.reset()
@@ -47,9 +49,9 @@ def main(argv: list[str]) -> int:
 
 
 def _powered(robot: Robot) -> list[str]:
-    """Return the drives that may hold their joint while no stop is held; none where the robot does not tell.
+    """Return the drives that may hold their joint while no stop is held, as far as the robot tells.
 
-    Then it is reset all the same: a reset enables nothing, and a fault has to be cleared.
+    A drive whose state it does not tell is one of them.
 
     Raises:
         RemoteError: of a robot that is not served, and why.
@@ -60,18 +62,31 @@ def _powered(robot: Robot) -> list[str]:
     except ClientError as error:
         if isinstance(error, RemoteError) and error.kind == ErrorKind.UNAVAILABLE:
             raise
-        return []
+        return [NOT_KNOWN.format("every drive")]
+    return [] if description.stop.held else _with_power(robot, description)
+
+
+def _is_stopped(robot: Robot) -> bool:
+    """Return whether a stop is held, as far as the robot tells."""
     with contextlib.suppress(ClientError):
-        return [] if description.stop.held else _with_power(robot, description)
-    return []
+        return robot.describe().stop.held
+    return False
 
 
 def _with_power(robot: Robot, description: Description) -> list[str]:
-    joints = {one.name for one in description.components if one.kind == "joint"}
-    states = [one for one in description.channels if one.component in joints and one.quantity == "state"]
-    values = robot.components(*(one.name for one in states)).values if states else {}
-    found = ((one.component, _word(one, values.get(one.name))) for one in states)
-    return [name if word else f"{name} (not known)" for name, word in found if not word or word in POWERED]
+    joints = [one.name for one in description.components if one.kind == "joint"]
+    states = {one.component: one for one in description.channels if one.quantity == "state"}
+    words = _words(robot, [states[joint] for joint in joints if joint in states])
+    found = ((joint, words.get(joint)) for joint in joints)
+    return [joint if word else NOT_KNOWN.format(joint) for joint, word in found if not word or word in POWERED]
+
+
+def _words(robot: Robot, states: Sequence[ChannelInfo]) -> dict[str, str | None]:
+    """Return the drives' states in words; of none where the robot does not tell them."""
+    with contextlib.suppress(ClientError):
+        values = robot.components(*(one.name for one in states)).values if states else {}
+        return {one.component: _word(one, values.get(one.name)) for one in states}
+    return {}
 
 
 def _word(channel: ChannelInfo, value: float | None) -> str | None:

@@ -121,17 +121,50 @@ def test_a_robot_that_was_stopped_while_its_reset_was_asked_about_stays_stopped(
     assert "stopped the robot meanwhile" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("method", ["robot.describe", "component.snapshot"])
+@pytest.mark.parametrize(
+    ("method", "asked"),
+    [
+        ("robot.describe", "are: every drive (not known)."),
+        ("component.snapshot", "are: left_hip (not known), left_knee (not known),"),
+    ],
+)
 @pytest.mark.parametrize("answer", [{"gone": "wrong"}, None])
-def test_a_look_that_fails_does_not_keep_a_fault_from_its_reset(
-    powered: FakeRobot, method: str, answer: object
+@pytest.mark.parametrize(("typed", "resets"), [("n\n", 0), ("y\n", 1)])
+def test_a_look_that_fails_is_asked_about_and_keeps_no_fault_from_its_reset(
+    powered: FakeRobot,
+    method: str,
+    asked: str,
+    answer: object,
+    typed: str,
+    resets: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """It took the power of drives that nobody had seen, unasked."""
+
     def refuse(_params: object) -> object:
         raise Refusal(-32010, "no module answers", kind="device_timeout")
 
     powered.overrides[method] = refuse if answer is None else lambda _params: answer
-    assert run(powered, "reset") == 0
-    assert len(powered.called("robot.reset")) == 1
+    monkeypatch.setattr("sys.stdin", Terminal(typed))
+    assert run(powered, "reset") == 1 - resets
+    assert asked in capsys.readouterr().err
+    assert len(powered.called("robot.reset")) == resets
+
+
+def test_a_joint_without_a_state_is_asked_about_by_its_name(
+    powered: FakeRobot, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only joints with a channel of their state were looked at."""
+    monkeypatch.setitem(STATES, 5, DOWN)
+    known = FakeRobot.describe(powered)
+    channels = [one for one in known["channels"] if one["name"] != "left_knee.state"]
+    assert len(channels) < len(known["channels"])
+    powered.overrides["robot.describe"] = lambda _params: known | {"channels": channels}
+    monkeypatch.setattr("sys.stdin", Terminal("n\n"))
+    assert run(powered, "reset") == 1
+    assert "are: left_knee (not known). A reset" in capsys.readouterr().err
+    assert powered.called("robot.reset") == []
 
 
 def test_a_robot_that_is_not_served_says_why_and_is_not_reset(
