@@ -3,6 +3,7 @@
 import codecs
 import re
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,10 +28,14 @@ _HINTS: Final = (
     (r"[^=]*=\s*\S+\s+[^#\s]", "something follows the value: a new key begins a new line"),
 )
 _MOST: Final = 50  # mistakes that are told of what is no TOML
+_DEEPEST: Final = 32  # tables and lists within one another: no file of ours has a quarter of that
+_TOO_DEEP: Final = Finding(
+    "", "", f"is nested too deeply: more than {_DEEPEST} tables or lists in one another"
+)
 
 
 class Unreadable(Exception):
-    """The file is not there, is no text or no TOML."""
+    """The file is not there, is no text, no TOML, or nested too deeply."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.words)
@@ -68,9 +73,28 @@ def parse(data: bytes) -> dict[str, Any]:
         said = "is no TOML: it is not in UTF-8; save it as UTF-8"
         raise Unreadable(Finding(f"line {line}", "", said)) from error
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        tables = tomllib.loads(text)
+    except RecursionError as error:
+        raise Unreadable(_TOO_DEEP) from error
+    except ValueError as error:
         raise Unreadable(_explained(str(error), text.splitlines())) from error
+    if _is_too_deep(tables):
+        raise Unreadable(_TOO_DEEP)
+    return tables
+
+
+def _is_too_deep(tables: dict[str, Any]) -> bool:
+    """Return whether who goes through all of it could run out of stack."""
+    level: list[Any] = [tables]
+    for _ in range(_DEEPEST):
+        level = [part for whole in level for part in _parts(whole)]
+    return bool(level)
+
+
+def _parts(whole: Any) -> Iterable[Any]:
+    """Return the tables and lists that a table or list holds."""
+    held = whole.values() if isinstance(whole, dict) else whole
+    return (one for one in held if isinstance(one, dict | list))
 
 
 def as_far_as_readable(file: Path, first: Finding) -> tuple[list[Finding], str | None]:
@@ -107,7 +131,7 @@ def _is_wrong(lines: list[str], number: int) -> bool:
         return False
     try:
         tomllib.loads(line)
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return True
     return False
 

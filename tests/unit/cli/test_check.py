@@ -360,6 +360,12 @@ def test_every_line_that_is_no_toml_is_told_and_the_rest_is_checked_without_them
     assert len(found) == 3, "what is missing is not known where lines could not be read"
 
 
+def test_a_number_that_is_too_long_for_any_is_a_mistake_as_any_other(tmp_path: Path) -> None:
+    """The command ended with an error of its own, where it stood in the last line."""
+    found = told(written(tmp_path, BARE + "\n[joint.x]\nnode_id = " + "1" * 5000))
+    assert "is no TOML: 'node_id = 111" in found
+
+
 @pytest.mark.parametrize("cut", ["[can.main", 'name = """x', "x = [\n1,"])
 def test_behind_what_does_not_end_nothing_is_guessed(cut: str, tmp_path: Path) -> None:
     found = told(written(tmp_path, f'{cut}\nbus = "main"\n[joint.x]\nnode_id = "y"\n'))

@@ -6,6 +6,7 @@ import pytest
 
 from drivers.bus.settings import Role
 from gateway import config as configs
+from gateway.tables.reading import parse
 from tests.unit.gateway.harness import HEAD, ROBOT, config
 
 JOINT = """
@@ -197,3 +198,21 @@ def test_bytes_that_are_no_text_are_named(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_bytes(b"[robot]\nname = '\xff'")
     with pytest.raises(configs.ConfigError, match="line 2: is no TOML: it is not in UTF-8"):
         configs.load(tmp_path / "robot.toml")
+
+
+@pytest.mark.parametrize(
+    "deep",
+    ["deep = " + "[" * 5000, "deep = " + "[" * 40 + "]" * 40, "[" + ".".join("d" * 5000) + "]"],
+    ids=["lists without an end", "lists", "a header"],
+)
+def test_a_file_that_is_nested_too_deeply_says_so_and_nothing_runs_out_of_stack(
+    tmp_path: Path, deep: str
+) -> None:
+    """It was no TOML at a line that was not to blame, or an error of our own further on."""
+    (tmp_path / "robot.toml").write_text(f"{HEAD}\n{deep}\n\n# the end")
+    with pytest.raises(configs.ConfigError, match=r"robot\.toml: is nested too deeply: more than 32 tables"):
+        configs.load(tmp_path / "robot.toml")
+
+
+def test_what_is_nested_as_deeply_as_files_may_be_is_read() -> None:
+    assert parse(b"deep = " + b"[" * 31 + b"]" * 31)
