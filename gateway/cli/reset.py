@@ -78,7 +78,9 @@ def _with_power(robot: Robot, description: Description) -> list[str]:
     states = {one.component: one for one in description.channels if one.quantity == "state"}
     words = _words(robot, [states[joint] for joint in joints if joint in states])
     found = ((joint, words.get(joint)) for joint in joints)
-    return [joint if word else NOT_KNOWN.format(joint) for joint, word in found if not word or word in POWERED]
+    return [
+        joint if word else NOT_KNOWN.format(joint) for joint, word in found if not word or word in POWERED
+    ]
 
 
 def _words(robot: Robot, states: Sequence[ChannelInfo]) -> dict[str, str | None]:

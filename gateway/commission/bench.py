@@ -5,8 +5,9 @@ They are commanded by a homing alone, for which one of them is put under power (
 
 import threading
 import time
-from collections.abc import Collection
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Collection, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from typing import Protocol
 
 import msgspec
@@ -105,6 +106,19 @@ class CanBench:
             self._open()
         self._bus.send_urgent(SDO_REQUEST + node, data)
 
+    @contextmanager
+    def listening(self, take: Callable[[int, bytes], None]) -> Iterator[None]:
+        """Call `take` within the block with each SDO answer and its node id, in the bus's thread."""
+        bus = self._bus
+        handlers = {SDO_RESPONSE + node: partial(_hand_over, take, node) for node in range(1, 128)}
+        for can_id, handler in handlers.items():
+            bus.subscribe(can_id, handler)
+        try:
+            yield
+        finally:
+            for can_id, handler in handlers.items():
+                bus.unsubscribe(can_id, handler)
+
     def map(self, node: int, axis: int, description: Description) -> str:
         channel, offset = self.channel(node), axis * AXIS_OFFSET
         free = list(free_tpdos(read_tpdos(channel, description), node, self._heard))
@@ -155,3 +169,7 @@ class CanBench:
             if self._bus.problem is not None or time.monotonic() > until:
                 raise Unavailable(self._bus.problem or f"{self._bus.name} did not open within {OPEN_S:g} s")
             threading.Event().wait(0.01)
+
+
+def _hand_over(take: Callable[[int, bytes], None], node: int, _stamp_ns: int, data: bytes) -> None:
+    take(node, data)

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -14,11 +14,12 @@ from gateway.records import durable
 
 SUFFIX = ".commission"
 LOCK = ".commission.lock"
+MOST_AXES = 8  # of a node (CiA 402-2)
 KINDS: Mapping[str, Any] = {  # what is reckoned with
     "name": str,
     "joints": list[str],
-    "node_id": int,
-    "axis": int,
+    "node_id": Annotated[int, msgspec.Meta(ge=1, le=127)],
+    "axis": Annotated[int, msgspec.Meta(ge=0, lt=MOST_AXES)],
     "direction": int,
     **dict.fromkeys(("counts_per_revolution", "gear_ratio", "zero_offset", "min", "max"), float),
 }
@@ -72,17 +73,24 @@ class Draft:
         self.file = file
         self.path = file.with_name(file.name + SUFFIX)
         self.tables: dict[str, dict[str, DraftValue]] = {}
-        if go_on and self.path.exists():
+        if go_on:
             try:
-                self.tables = msgspec.json.decode(
-                    self.path.read_bytes(), type=dict[str, dict[str, DraftValue]]
-                )
-                for key, found in (pair for keys in self.tables.values() for pair in keys.items()):
-                    msgspec.convert(found.value, KINDS.get(key, Any))
-            except (OSError, msgspec.DecodeError) as error:
+                self.tables = self._left()
+            except (OSError, ValueError, RecursionError, msgspec.MsgspecError) as error:
                 raise SettingsError(
                     f"{self.path}: cannot be gone on with: {error}; remove it to begin anew"
                 ) from error
+
+    def _left(self) -> dict[str, dict[str, DraftValue]]:
+        """Return what was found before; nothing where there is no draft."""
+        try:
+            data = self.path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
+        tables = msgspec.json.decode(data, type=dict[str, dict[str, DraftValue]])
+        for key, found in (pair for keys in tables.values() for pair in keys.items()):
+            msgspec.convert(found.value, KINDS.get(key, Any))
+        return tables
 
     def has(self, table: str, key: str) -> bool:
         return key in self.tables.get(table, {})

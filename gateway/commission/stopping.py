@@ -3,10 +3,12 @@
 Like every stop it can enable nothing (`drivers.joint.commands`). It is software, not an emergency stop.
 """
 
+import threading
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,14 +22,19 @@ from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import StopOutcome, Stopping
 from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
-from gateway.commission.draft import Draft
+from gateway.commission.draft import MOST_AXES, Draft
+from gateway.tables.reading import Unreadable, parse
 
 WITHIN_S = 1.5  # for a drive to confirm it
-MOST_AXES = 8  # of a node (CiA 402-2)
+ANSWER_S = 0.5  # for a node that was asked without being known, to answer
 NO_DRIVE = "the robot's file has no drive"
+NONE_KNOWN = "no drive is known yet; all 127 node ids were asked to stop"
 OTHERS = "draft and robot's file do not tell of every drive: others may be on the bus"
 UNREADABLE = "cannot be read, so no drive is known for sure; all 127 node ids were asked to stop"
 EVERY_NODE = range(1, 128)
+_NODE_NAMES = frozenset(map(str, EVERY_NODE))
+_ABOUT = CONTROLWORD.to_bytes(2, "little") + b"\0"
+_ABORT, _NO_OBJECT = 0x80, 0x0602_0000.to_bytes(4, "little")  # CiA 301 §7.2.4.3.17
 
 
 class _Joint(msgspec.Struct):
@@ -80,10 +87,8 @@ class Stopped:
 
     @property
     def words(self) -> str:
-        if self.problem and not self.drives:
-            return f"NOT CONFIRMED: {self.problem}"
         if not self.drives:
-            return "NOT CONFIRMED: no drive is known yet; all 127 node ids were asked to stop"
+            return f"NOT CONFIRMED: {self.problem or NONE_KNOWN}"
         if self.confirmed:
             return f"STOP is confirmed by {', '.join(self.drives)}"
         missing = ", ".join(self._missing)
@@ -101,7 +106,8 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
 
     Known are those that were found until now, and the joints of the robot's file. While there is a draft all
-    node ids are asked, too: it may not tell of every drive.
+    node ids are asked, too: it may not tell of every drive. Whoever answers is looked at. Nothing that a file
+    says, or a folder that is gone, keeps the stop from going out.
 
     Raises:
         DriverError: the bus does not open.
@@ -109,11 +115,12 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     """
     drafted, written = set(axes_of(draft)), _joints_in(draft.file)
     known = drafted | (written or {}).keys()
-    found = _stopped(bench, known, every=draft.path.exists())
-    is_open = (not drafted and draft.path.exists()) or written is None
-    problem = OTHERS if is_open and known else ""
-    if written is None and not known:
-        problem = f"{draft.file} {UNREADABLE}"
+    is_draft = bool(draft.tables) or _may_exist(draft.path)
+    found = _stopped(bench, known, every=is_draft or written is None or not known)
+    is_open = (is_draft and not drafted) or written is None
+    problem = OTHERS if is_open else ""
+    if not known:
+        problem = NONE_KNOWN if written is not None else f"{draft.file} {UNREADABLE}"
     names = {str(axis): name for axis, name in ((written or {}) | _joints_of(draft)).items()}
     return Stopped.of({str(axis): one for axis, one in found.items()}, problem, names)
 
@@ -146,21 +153,40 @@ def stop_all(buses: Mapping[str, tuple[CanBench, Mapping[Axis, str]]]) -> Stoppe
 
 
 def _stopped(bench: CanBench, known: Collection[Axis], *, every: bool = False) -> dict[Axis, DriveStopped]:
+    """Stop what is `known`, and with `every` whoever answers that was not."""
     sent_ns: dict[Axis, int] = {}
-    asked = {*known, *(map(Axis, EVERY_NODE) if every or not known else ())}
-    for axis in sorted(asked, key=lambda one: (one not in known, _place(one))):
-        sent_ns[axis] = time.monotonic_ns()
-        bench.send_urgent(axis.node, _request(axis))
-    found = _confirmed(bench, known, sent_ns)
+    answered: set[int] = set()
+    others = [axis for axis in map(Axis, EVERY_NODE) if axis not in known] if every else []
+    with bench.listening(partial(_note, answered)):
+        for axis in (*sorted(known, key=_place), *others):
+            sent_ns[axis] = time.monotonic_ns()
+            bench.send_urgent(axis.node, _request(axis))
+        found = _confirmed(bench, known, sent_ns)
+        if others:
+            _ask_again(bench, [axis for axis in others if axis.node not in answered])
+    found |= _confirmed(bench, [axis for axis in others if axis.node in answered], sent_ns)
     further = [axis for axis in _further(bench, found) if axis not in found]
     return found | _confirmed(bench, further, sent_ns)
+
+
+def _note(answered: set[int], node: int, data: bytes) -> None:
+    """Note a node that answers to its controlword, in whichever way but that it has none: no drive."""
+    if data[1:4] == _ABOUT and (data[0], data[4:8]) != (_ABORT, _NO_OBJECT):
+        answered.add(node)
+
+
+def _ask_again(bench: CanBench, silent: Iterable[Axis]) -> None:
+    """Ask those once more, as the interface may not have let their answers through; wait for these."""
+    for axis in silent:
+        bench.send_urgent(axis.node, _request(axis))
+    threading.Event().wait(ANSWER_S)
 
 
 def axes_of(draft: Draft) -> Iterator[Axis]:
     """Yield every drive that was found until now: the first axis of each node, and each joint's."""
     for table in draft.tables:
         kind, _, name = table.partition(".")
-        if kind == "node" and name.isdecimal() and draft.has(table, "identity"):
+        if kind == "node" and name in _NODE_NAMES and draft.has(table, "identity"):
             yield Axis(int(name))
     yield from _joints_of(draft)
 
@@ -177,13 +203,21 @@ def _joints_of(draft: Draft) -> dict[Axis, str]:
 
 def _joints_in(file: Path) -> dict[Axis, str] | None:
     """Return the joints of a robot's file by axis; None where there is one, and it does not say them."""
-    if not file.exists():
-        return {}
     try:
-        joints = msgspec.toml.decode(file.read_bytes(), type=_File).joint
-    except (OSError, ValueError, msgspec.MsgspecError):
+        joints = msgspec.convert(parse(file.read_bytes()), _File).joint
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except (OSError, ValueError, Unreadable, msgspec.MsgspecError):
         return None
     return {Axis(one.node_id, one.axis): name for name, one in joints.items()}
+
+
+def _may_exist(file: Path) -> bool:
+    """Return whether it is there, or nobody can tell."""
+    try:
+        return file.exists()
+    except OSError:
+        return True
 
 
 def _request(axis: Axis) -> bytes:

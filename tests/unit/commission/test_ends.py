@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,12 +17,14 @@ import pytest
 from drivers.bus.settings import CanSettings
 from gateway.cli import commission_lines, joint_test
 from gateway.cli.motion_ends import ENDS
+from gateway.commission import stopping
 from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
 from gateway.commission.draft import Draft
 from gateway.commission.stopping import stop, stop_all
 from gateway.main import main
 from tests.support.waiting import until
+from tests.unit.bus.fake_node import FakeNode
 from tests.unit.commission.homing_drive import HomingDrive
 from tests.unit.joint.standard import S
 
@@ -96,6 +99,127 @@ def test_a_stop_asks_the_drives_that_were_found_and_those_of_the_file_before(
         finally:
             bench.close()
         assert (found.state, kept.state) == (S.SWITCH_ON_DISABLED, S.SWITCH_ON_DISABLED)
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[CanBench]:
+    """A bus by the test's name; its nodes have time to answer on a slow computer, too."""
+    monkeypatch.setattr(stopping, "ANSWER_S", 1.0)
+    made = CanBench("main", CanSettings(interface="virtual", channel=request.node.nodeid))
+    yield made
+    made.close()
+
+
+def enabled(request: pytest.FixtureRequest, node: int, **quirks: Any) -> HomingDrive:
+    return HomingDrive(request.node.nodeid, node, state=S.OPERATION_ENABLED, **quirks)
+
+
+def test_a_drive_that_was_not_found_yet_is_stopped_too_and_named(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    with enabled(request, 5), enabled(request, 6) as unknown:
+        stopped = stop(bench, draft)
+        assert unknown.state == S.SWITCH_ON_DISABLED
+    assert stopped.words == "STOP is confirmed by node 5, node 6"
+
+
+def test_a_drive_that_was_not_found_yet_and_stays_enabled_is_no_confirmed_stop(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    """It was asked, and nobody looked whether it stopped."""
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    with enabled(request, 5), enabled(request, 6, deaf_to_words={0x02}):
+        stopped = stop(bench, draft)
+    assert stopped.drives == {"node 5": "confirmed", "node 6": "unconfirmed"}
+    assert not stopped.confirmed
+    assert stopped.words == "NOT CONFIRMED: node 6 is unconfirmed"
+
+
+def test_a_node_without_a_controlword_is_no_drive_that_has_to_stop(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    no_drive = {(0x6040, 0): 0x0602_0000, (0x6041, 0): 0x0602_0000}
+    refusing = {(0x6040, 0): 0x0800_0022, (0x6041, 0): 0x0800_0022}  # it has one, and does not say its state
+    with (
+        enabled(request, 5),
+        FakeNode(request.node.nodeid, 16, aborts=no_drive) as sensor,
+        FakeNode(request.node.nodeid, 17, aborts=refusing),
+    ):
+        stopped = stop(bench, draft)
+        assert sensor.requests, "it was asked, as all are"
+    assert stopped.drives == {"node 5": "confirmed", "node 17": "unconfirmed"}
+
+
+def test_a_draft_whose_folder_has_gone_still_does_not_tell_of_every_drive(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / "stick" / "exo-01.toml")
+    draft.file.parent.mkdir()
+    draft.put("node.5", "identity", [0, 0, 5])
+    shutil.rmtree(draft.file.parent)
+    with enabled(request, 5), enabled(request, 6) as unknown:
+        stopped = stop(bench, draft)
+        assert unknown.state == S.SWITCH_ON_DISABLED
+    assert stopped.drives == {"node 5": "confirmed", "node 6": "confirmed"}
+
+
+TOO_LONG = [250, 300]  # for the draft's name, and for the file's as well: looking for it is an OSError
+
+
+@pytest.mark.parametrize("length", TOO_LONG)
+def test_files_that_cannot_even_be_looked_for_keep_no_stop_from_going_out(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest, length: int
+) -> None:
+    draft = Draft(tmp_path / ("e" * length), go_on=False)
+    with enabled(request, 5) as drive:
+        stopped = stop(bench, draft)
+        assert drive.state == S.SWITCH_ON_DISABLED
+    assert stopped.drives == {"node 5": "confirmed"}
+    assert not stopped.confirmed
+
+
+def test_a_draft_that_may_be_there_may_tell_of_more_than_the_file(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / ("e" * TOO_LONG[0]), go_on=False)
+    draft.file.write_text("[joint.left_knee]\nnode_id = 5\n")
+    with enabled(request, 5), enabled(request, 6) as unknown:
+        stopped = stop(bench, draft)
+        assert unknown.state == S.SWITCH_ON_DISABLED
+    assert stopped.words.startswith("NOT CONFIRMED: draft and robot's file do not tell of every drive")
+
+
+@pytest.mark.usefixtures("signals")
+@pytest.mark.parametrize("length", TOO_LONG)
+def test_the_command_sends_its_stop_whatever_its_files_are(
+    tmp_path: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str], length: int
+) -> None:
+    with enabled(request, 5) as drive:
+        options = ["commission", "--stop", str(tmp_path / ("e" * length)), f"virtual:{request.node.nodeid}"]
+        assert main(options) == 1
+        assert drive.state == S.SWITCH_ON_DISABLED
+    assert "only node 5 confirmed it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "text", ["[[[ damaged", "deep = " + "[" * 5000, "[joint.left_knee]\nnode_id = 128\n"]
+)
+def test_a_robots_file_that_cannot_be_read_is_named_and_every_node_asked(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest, text: str
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.file.write_text(text)
+    why = f"{draft.file} cannot be read, so no drive is known for sure; all 127 node ids were asked to stop"
+    assert stop(bench, draft).words == f"NOT CONFIRMED: {why}"
+    with enabled(request, 5) as drive:
+        stopped = stop(bench, draft)
+        assert drive.state == S.SWITCH_ON_DISABLED
+    assert stopped.words == f"NOT CONFIRMED: {why}; only node 5 confirmed it"
 
 
 def test_a_bus_that_is_not_there_is_said_before_anything_is_asked_and_leaves_no_file(

@@ -234,7 +234,16 @@ def test_a_comment_stays_one_line_and_beside_a_value_only_where_it_fits(draft: D
 
 @pytest.mark.parametrize(
     "left",
-    [b"", b"{", b"\xff\xfe", b"[]", b'{"robot": 7}', b'{"robot": {"joints": {"value": "left_knee"}}}'],
+    [
+        b"",
+        b"{",
+        b"\xff\xfe",
+        b"[]",
+        b'{"robot": 7}',
+        b'{"robot": {"joints": {"value": "left_knee"}}}',
+        b'{"joint.left_knee": {"node_id": {"value": 128}}}',
+        b'{"robot": {"deep": {"value": ' + b"[" * 30_000,
+    ],
 )
 def test_a_damaged_draft_is_named_and_not_gone_on_with(tmp_path: Path, left: bytes) -> None:
     (tmp_path / "exo-01.toml.commission").write_bytes(left)
