@@ -239,17 +239,23 @@ class App:
 
     def stop(self, reason: str) -> None:
         """STOP the robot that is looked at, and one that is commissioned; from any thread."""
-        if self.commissioning.runs:
-            self.commissioning.stop()
-        if (station := self.desk.selected) is not None:
-            self._stop(station.name, reason)
+        try:
+            if (station := self.desk.selected) is not None:
+                self._stop(station.name, reason)
+        finally:
+            self._stop_commissioned()
 
     def stop_all(self, reason: str) -> None:
         """STOP every robot, and one that is commissioned; from any thread."""
+        try:
+            stops = self.desk.send_stop_all(reason)
+            self._poster.deliver(lambda: self.desk.note_stop_all(stops))
+        finally:
+            self._stop_commissioned()
+
+    def _stop_commissioned(self) -> None:
         if self.commissioning.runs:
             self.commissioning.stop()
-        stops = self.desk.send_stop_all(reason)
-        self._poster.deliver(lambda: self.desk.note_stop_all(stops))
 
     def _keep(self, robot: str, told: EditEvidence) -> None:
         report = self.desk.recording.link(self._stations[robot].address)

@@ -1,7 +1,9 @@
 """The whole window on a gateway over TCP: it follows, writes, stops, and lets go of everything at its end."""
 
-from collections.abc import Iterator
+import contextlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import msgspec
 import pytest
@@ -11,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.wire.dictionary import ObjectList
 from server_gui.app import App
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.core.tuning.stop import StopState
@@ -65,6 +68,31 @@ def test_stop_is_confirmed_by_the_robot_and_not_confirmed_without_one(app: App, 
     wait(lambda: not station.is_linked, "lost the link")
     app.stop("test")
     wait(lambda: station.stopping.state is StopState.NOT_CONFIRMED, "said that it was not confirmed")
+
+
+@pytest.mark.parametrize("stop", [App.stop, App.stop_all])
+def test_an_error_at_one_that_is_stopped_keeps_the_stop_from_no_other(
+    app: App, robot: FakeRobot, monkeypatch: pytest.MonkeyPatch, stop: Callable[[App, str], None]
+) -> None:
+    """The robot that is commissioned came first, and its error was all that happened."""
+    asked: list[str] = []
+
+    def fail(*_: object) -> NoReturn:
+        asked.append("commissioned")
+        raise OSError("the pipe is closed")
+
+    monkeypatch.setattr(Commissioning, "runs", True)
+    monkeypatch.setattr(app.commissioning, "stop", fail)
+    with pytest.raises(OSError, match="the pipe is closed"):
+        stop(app, "test")
+    station = app.desk.stations[0]
+    wait(lambda: station.stopping.state is StopState.CONFIRMED, "confirmed the stop")
+    assert len(robot.called("robot.stop")) == 1
+    monkeypatch.setattr(Station, "send_stop", fail)
+    monkeypatch.setattr(app.commissioning, "stop", lambda: asked.append("stopped"))
+    with contextlib.suppress(OSError):
+        stop(app, "test")
+    assert asked[-1] == "stopped"
 
 
 def test_a_robot_that_comes_back_is_followed_again_and_control_was_lost(app: App, robot: FakeRobot) -> None:

@@ -24,7 +24,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.faulty import CAUSE, fault
-from tests.support.desk import JOINTS, described, looked, walking
+from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
@@ -136,6 +136,9 @@ def test_the_result_of_stop_all_is_wholly_in_sight_beside_each_robots_own_until_
     bench.desk.stop_all("all")
     bench.first.answer(ALL)
     bench.commands[1].fail(NotConnected("there is no link"))
+    off: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    later_ns = time.monotonic_ns() + 3_600_000_000_000  # so that it is live, however slow this computer is
+    bench.station.take([telemetry([later_ns], off, later_ns)])
     bench.draw(window)
     bar = window.stopped_all
     assert bar.text.startswith("STOP ALL: 1 of 2 robots stopped")

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from gateway.client import ConnectionState
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.follow.robot import Robot
 
@@ -55,7 +54,7 @@ def state_words(robot: Robot) -> dict[str, str | None]:
 
 def is_live(robot: Robot) -> bool:
     """Return whether what is known of it is of now."""
-    return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
+    return robot.is_linked and not robot.is_stale()
 
 
 def listed(names: list[str]) -> str:

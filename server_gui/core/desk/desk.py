@@ -1,9 +1,13 @@
 """All robots of the window, which one is looked at, and how things are shown."""
 
+import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from gateway.wire.stop import Stopped
 from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
@@ -14,6 +18,8 @@ from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.tuning.stop import Sent
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
@@ -93,6 +99,8 @@ class Desk:
         """Look at it no more; another one is selected where it was."""
         if not station.robot.is_recording:
             station.tell(NewsKind.CONTROL, f"removed from this window{_left_as(station)}")
+        if self._stop_all is not None:
+            self._stop_all.remove(station)
         self.stations.remove(station)
         if self.selected is station:
             self.select(self.stations[0] if self.stations else None)
@@ -108,22 +116,49 @@ class Desk:
         self.note_stop_all(self.send_stop_all(reason))
 
     def send_stop_all(self, reason: str) -> list[tuple[Station, Sent]]:
-        """Send it from any thread, at once; the answers are for `note_stop_all`."""
-        return [(station, station.send_stop(reason)) for station in tuple(self.stations)]
+        """Send it from any thread, at once; the answers are for `note_stop_all`.
+
+        Whatever fails at one robot keeps it from no other: that one's STOP is not confirmed.
+        """
+        return [(station, _sent(station, reason)) for station in tuple(self.stations)]
 
     def note_stop_all(self, stops: Sequence[tuple[Station, Sent]]) -> None:
         """Follow what becomes of a STOP ALL that was sent."""
         for station, sent in stops:
-            station.note_stop(sent)
+            _note(station, sent)
         self._stop_all = StopAll([station for station, _ in stops])
 
     @property
     def stopped_all(self) -> StopAllResult | None:
         """What became of STOP ALL; None before one, and once every robot is reset."""
-        found = None if self._stop_all is None else self._stop_all.look(self.stations)
+        found = None if self._stop_all is None else self._stop_all.look()
         if found is None:
             self._stop_all = None
         return found
+
+
+def _sent(station: Station, reason: str) -> Sent:
+    at_ns = time.monotonic_ns()
+    try:
+        return station.send_stop(reason)
+    except Exception as error:
+        log.exception("%s: STOP ALL was not sent, or is not known to be", station.name)
+        failed: Future[Stopped] = Future()
+        failed.set_exception(RuntimeError(f"nobody knows whether it was sent: {_words(error)}"))
+        return Sent(at_ns, failed)
+
+
+def _note(station: Station, sent: Sent) -> None:
+    try:
+        station.note_stop(sent)
+    except Exception as error:
+        log.exception("%s: nobody follows what becomes of its STOP", station.name)
+        stopping = station.stopping
+        stopping.failed(stopping.number, f"nobody follows what becomes of it: {_words(error)}")
+
+
+def _words(error: Exception) -> str:
+    return f"internal error: {type(error).__name__}: {error}"
 
 
 def _left_as(station: Station) -> str:

@@ -154,7 +154,7 @@ class Station:
     @property
     def is_linked(self) -> bool:
         """Whether there is a link now."""
-        return self.robot.link.state is ConnectionState.CONNECTED
+        return self.robot.is_linked
 
     @property
     def is_live(self) -> bool:

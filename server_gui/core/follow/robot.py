@@ -150,6 +150,10 @@ class Robot:
         age_s = self.age_s(now_ns)
         return age_s is None or age_s * 1e9 > STALE_NS
 
+    def is_newer_than(self, at_ns: int) -> bool:
+        """Return whether the newest row was taken after this instant, of our clock."""
+        return self._newest_ns is not None and self._newest_ns > at_ns
+
     def rate_hz(self, now_ns: int | None = None) -> float:
         """Return rows a second over the last two seconds."""
         now_ns = frame_time.now_ns() if now_ns is None else now_ns
@@ -176,6 +180,11 @@ class Robot:
     def now_s(self) -> float:
         """Return the instant that is shown, UTC."""
         return time.time()
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether there is a link now."""
+        return self.link.state is ConnectionState.CONNECTED
 
     @property
     def boot_id(self) -> str | None:

@@ -163,6 +163,7 @@ class StopProgress:
     def failed(self, number: int, reason: str) -> None:
         """Note that nobody answered: consider the robot not stopped."""
         if number == self.number:
+            self.silent, self._confirmed = (), ()
             self._not_confirmed(reason)
 
     def was_reset(self, held: bool, at_s: float | None = None) -> None:
@@ -170,6 +171,7 @@ class StopProgress:
         self.held = held
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
+            self.silent, self._confirmed = (), ()  # of one that is over: they say nothing of the next one
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
 
     # --- what the robot shows meanwhile
@@ -314,6 +316,13 @@ class StopProgress:
         after_ms = [proof.after_ms for drive in asked if (proof := self.proofs.get(drive)) is not None]
         is_shown = len(after_ms) == len(asked)
         return max(1.0, *after_ms) if is_shown else self.answered_ms or 0.0
+
+    @property
+    def answered_ns(self) -> int:
+        """When the drives' answers to the latest STOP came, on our clock; 0: they have not."""
+        if self.at_ns is None or self.answered_ms is None:
+            return 0
+        return self.at_ns + round(self.answered_ms * 1e6)
 
     @property
     def already_off(self) -> frozenset[str]:
