@@ -116,7 +116,7 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
     drafted, written = set(axes_of(draft)), _joints_in(draft.file)
     known = drafted | (written or {}).keys()
     is_draft = bool(draft.tables) or _may_exist(draft.path)
-    found = _stopped(bench, known, every=is_draft or written is None or not known)
+    found = _stopped(bench, known, every=is_draft or not known)
     is_open = (is_draft and not drafted) or written is None
     problem = OTHERS if is_open else ""
     if not known:

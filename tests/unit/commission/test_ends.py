@@ -168,6 +168,18 @@ def test_a_draft_whose_folder_has_gone_still_does_not_tell_of_every_drive(
     assert stopped.drives == {"node 5": "confirmed", "node 6": "confirmed"}
 
 
+def test_a_draft_beside_a_file_that_cannot_be_read_may_not_tell_of_every_drive(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    draft.file.write_text("[[[ damaged")
+    with enabled(request, 5):
+        stopped = stop(bench, draft)
+    others = "draft and robot's file do not tell of every drive: others may be on the bus"
+    assert stopped.words == f"NOT CONFIRMED: {others}; only node 5 confirmed it"
+
+
 TOO_LONG = [250, 300]  # for the draft's name, and for the file's as well: looking for it is an OSError
 
 
