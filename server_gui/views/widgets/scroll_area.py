@@ -15,6 +15,7 @@ class ScrollArea(QScrollArea):
     def __init__(self, view: QWidget | None = None) -> None:
         super().__init__()
         self._has_grown = False
+        self._is_fitting = False
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         if view is not None:
@@ -46,9 +47,26 @@ class ScrollArea(QScrollArea):
                 event.ignore()  # it goes to whoever is behind
                 return True
             return False
-        if event.type() == QEvent.Type.LayoutRequest and watched is self.widget():
-            self._grow()
+        if watched is self.widget():
+            if event.type() == QEvent.Type.LayoutRequest:
+                self._grow()
+            elif event.type() == QEvent.Type.Resize:
+                return self._fit(watched, event)
         return super().eventFilter(watched, event)
+
+    def _fit(self, view: QWidget, event: QEvent) -> bool:
+        """Let Qt show or hide the scroll bar once for each size of the view.
+
+        That resizes the view again, which says by then what it needs at the size before: where it needs more
+        at one of the two, Qt went on for ever. What it needs at the new size it says by a layout request.
+        """
+        if self._is_fitting:
+            return False
+        self._is_fitting = True
+        try:
+            return super().eventFilter(view, event)
+        finally:
+            self._is_fitting = False
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
