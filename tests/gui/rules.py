@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.views.frame.chip import Chip
+from server_gui.views.robots.others_bar import RobotChip
 from server_gui.views.robots.panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel, PathLabel
@@ -126,7 +127,7 @@ def cut_titles(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[
 
 
 def cut_states(sight: Iterable[QWidget]) -> Iterator[str]:
-    """Every worst state of a robot, on its card or in the header, of which letters have no room."""
+    """Every worst state of a robot, on its card or chip or in the header, of which letters have no room."""
     for widget in sight:
         if isinstance(widget, Chip) and widget._words.shorter:
             label, word = widget._detail, widget._words.shorter
@@ -135,6 +136,8 @@ def cut_states(sight: Iterable[QWidget]) -> Iterator[str]:
                 yield f"{_path(widget)}: {label.text()} for {word}"
         elif isinstance(widget, RobotCard) and not widget._state.is_whole:
             yield f"{_path(widget)}: {widget._state.shown}"
+        elif isinstance(widget, RobotChip) and not widget.state.is_whole:
+            yield f"{_path(widget)}: {widget.state.shown}"
 
 
 def out_of_reach(window: QWidget, every: Iterable[QWidget] | None = None) -> list[str]:

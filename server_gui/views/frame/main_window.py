@@ -49,6 +49,7 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.predictions import activity
 from server_gui.views.refresh_rate import RefreshRate
+from server_gui.views.robots.others_bar import OthersBar
 from server_gui.views.robots.panel import HINT_ALL, RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.robots.stop_all_bar import StopAllBar
@@ -126,6 +127,7 @@ class MainWindow(QMainWindow):
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
         self.stopped_all = StopAllBar(desk, theme)
+        self.others = OthersBar(desk, theme, self.robots)
         self.robots.added.connect(self.added)
         self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
@@ -200,6 +202,7 @@ class MainWindow(QMainWindow):
         self.stopped_all.refresh()
         self.alarms.refresh()
         self._hold_header()
+        self.others.refresh()
         self.robots.refresh()
         self.parameters.refresh()
         self._panels.say_whose(self.docks[1], self._desk.whose)
@@ -350,6 +353,7 @@ class MainWindow(QMainWindow):
         top = _column(above)
         top.addWidget(self.header)
         top.addWidget(self.alarms)
+        top.addWidget(self.others)
         top.addWidget(self.page_bar)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {

@@ -44,6 +44,7 @@ from server_gui.views.predictions import (
     step_phases,
 )
 from server_gui.views.refresh_rate import READ_NS
+from server_gui.views.robots.others_bar import OthersBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.colour_bar import ColourBar
@@ -154,7 +155,8 @@ class Overview(QWidget):
 
         As alarms and lines come and go the order stays: nobody looks for a card while something is wrong.
         """
-        window, bars = self.window(), self.window().findChildren(QToolBar)  # the demo's
+        window = self.window()
+        bars = [*window.findChildren(QToolBar), *window.findChildren(OthersBar)]  # the first are the demo's
         high = window.height() - sum(bar.height() for bar in bars if bar.isVisible())
         rows, is_first = self._model.rowCount(), self.is_numbers_first
         room = window.width(), high, self._theme.scale, rows, self._columns, is_first

@@ -85,6 +85,11 @@ class RobotCard(ClickableFrame):
         column.addWidget(self.stop)
 
     @property
+    def is_whole(self) -> bool:
+        """Whether all of it is on the screen."""
+        return self.isVisible() and self.visibleRegion().boundingRect() == self.rect()
+
+    @property
     def texts(self) -> tuple[str, str, str, str]:
         """The shown texts: name, state, age, activity of the robot."""
         return self.station.title, self._state.text(), self._link.text(), self._doing.text()
@@ -110,15 +115,9 @@ class RobotCard(ClickableFrame):
         self._where.setVisible(has_twin)
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
-        worst = station.alarms.worst
-        where = "" if worst is None or not worst.spoken or worst.spoken in mark.word else worst.spoken
-        said = () if worst is None else (worst.brief, f"{mark.word}: {where}" if where else "")
-        short, stopping = SHORTER.get(mark.word, mark.word), station.stopping
-        if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:
-            said = (*said, stopping.timed(f"{mark.word} {stopping.drives}/{stopping.drives}"))
         # One line: its STOP does not move with what is wrong.
-        self._state.say(*filter(None, (*said, mark.word, short)))
-        set_tip(self._state, "" if worst is None else worst.line)
+        self._state.say(*state_words(station))
+        set_tip(self._state, state_tip(station))
         self._doing.say(*doing(station))
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_text()}"
@@ -127,6 +126,22 @@ class RobotCard(ClickableFrame):
         if self.property("selected") != selected:
             self.setProperty("selected", selected)
             self.style().polish(self)
+
+
+def state_words(station: Station) -> tuple[str, ...]:
+    """Return how a robot is, the fullest wording first: the last is the word of its mark, or shorter."""
+    mark, worst, stopping = station.mark, station.alarms.worst, station.stopping
+    where = "" if worst is None or not worst.spoken or worst.spoken in mark.word else worst.spoken
+    said = () if worst is None else (worst.brief, f"{mark.word}: {where}" if where else "")
+    if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:
+        said = (*said, stopping.timed(f"{mark.word} {stopping.drives}/{stopping.drives}"))
+    return tuple(filter(None, (*said, mark.word, SHORTER.get(mark.word, mark.word))))
+
+
+def state_tip(station: Station) -> str:
+    """Return its worst alarm in full."""
+    worst = station.alarms.worst
+    return "" if worst is None else worst.line
 
 
 def folded(name: str, metrics: QFontMetrics, room: int) -> str:
@@ -222,6 +237,11 @@ class RobotsPanel(QWidget):
             card.stop.be_light(is_light)
         self.all_stop.setEnabled(bool(stations))
         self.none.setVisible(not stations)
+
+    @property
+    def shows_all(self) -> bool:
+        """Whether the cards of all robots are whole on the screen: not one has to be scrolled to."""
+        return all(card.is_whole for card in self.cards)
 
     def _restyle(self) -> None:
         self.setMinimumWidth(self._theme.px(170))
