@@ -139,3 +139,49 @@ def test_an_insole_in_trouble_is_named_on_the_button_of_the_wearer(
     button = page.sections.buttons[1]
     assert button.text() == "■ Wearer and plots: left insole"
     assert button.property("tone") == "bad"
+
+
+@pytest.mark.parametrize("scale", [1.5, 2.0])
+@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
+def test_no_page_leaves_room_empty_and_joints_alone_have_higher_rows(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(width, height)
+    window.docks[0].hide()
+    bench.station.take([walking(300), looked()])
+    settle(window, bench)
+    page = window.tabs.overview
+    table = page._table
+    for shown in page._pages:
+        page._choose(shown)
+        settle(window, bench)
+        cards = [card for section in shown for card in page._cards[section]]
+        last = max(card.geometry().bottom() + 1 for card in cards)
+        assert last + page._grid.contentsMargins().bottom() == page.height(), "nothing is left below"
+        if Section.JOINTS not in shown:
+            continue
+        rows = [table.rowHeight(row) for row in range(table.model().rowCount())]
+        assert len(set(rows)) == 1, "none looks more important"
+        is_fuller = rows[0] == theme.px(44) or table.viewport().height() - sum(rows) < 2 * len(rows)
+        assert theme.px(19) <= rows[0] <= theme.px(44)
+        assert is_fuller if shown == JOINTS else rows[0] == theme.px(19)
+        assert scrolled(page) == 0
+
+
+def test_few_joints_alone_have_rows_no_higher_than_the_eye_follows(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    bench.station.take([walking(300), looked()])
+    settle(window, bench)
+    page = window.tabs.overview
+    assert page._page == JOINTS
+    model = page._model
+    model.beginResetModel()
+    model._joints, model._cells = model._joints[:2], model._cells[:2]
+    model.endResetModel()
+    rules.settle()
+    assert [page._table.rowHeight(row) for row in range(2)] == [theme.px(44)] * 2
+    assert page._table.geometry().top() < theme.px(60), "the rest is below"

@@ -78,7 +78,9 @@ FEW_WORDS: Final = {
     "fault reaction active": "fault",
 }
 LEAST_ERROR: Final = "0x0000"  # its words stand below the table then
-BAR_HIGH: Final = 4  # at text of 100 %
+ROW: Final = 19  # high, at text of 100 %
+MOST_ROW: Final = 44  # likewise, where the table fills its page: a line is still followed by the eye
+BAR_SHARE: Final = 0.21  # of a row's height
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -212,7 +214,7 @@ class BarDelegate(SentenceDelegate):
             option.text = in_few_words(text)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        high = self._theme.px(BAR_HIGH)
+        high = round(option.rect.height() * BAR_SHARE)
         text = QStyleOptionViewItem(option)
         if any(isinstance(index.sibling(index.row(), one).data(BAR), Bar) for one in (ANGLE, TORQUE)):
             text.rect = option.rect.adjusted(0, 0, 0, -high - 1)  # all words of a row on one line
@@ -232,13 +234,17 @@ class BarDelegate(SentenceDelegate):
 
 
 class JointTable(QTableView):
-    """The table of a `JointModel`: as high as its rows; where it is narrow, without its spare columns."""
+    """The table of a `JointModel`: as high as its rows; where it is narrow, without its spare columns.
+
+    Where it `fills` its page its rows are higher.
+    """
 
     def __init__(self, model: JointModel, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self._model = model
         self._bars = BarDelegate(theme)
+        self._fills = False
         self.setModel(model)
         self.setItemDelegate(self._bars)
         self.setAccessibleName("Joints")
@@ -263,8 +269,13 @@ class JointTable(QTableView):
         return QSize(self._theme.px(150), self.sizeHint().height())
 
     def sizeHint(self) -> QSize:
-        rows = max(self._model.rowCount(), 1) * self.verticalHeader().defaultSectionSize()
-        return QSize(self._theme.px(600), rows + self.horizontalHeader().sizeHint().height() + 2)
+        return QSize(self._theme.px(600), self._high(ROW))
+
+    def fill(self, on: bool) -> None:
+        """Take the height that there is, up to `MOST_ROW` a row; or no more than needed."""
+        if on is not self._fills:
+            self._fills = on
+            self._restyle()
 
     def point_to_words(self, *, above: bool) -> None:
         """Say where the words stand that have no room in their column."""
@@ -288,12 +299,34 @@ class JointTable(QTableView):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._fit_rows()
         self._fit()
 
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(19))
-        self.setFixedHeight(self.sizeHint().height())
+        self.setMinimumHeight(self._high(ROW))
+        self.setMaximumHeight(self._high(MOST_ROW if self._fills else ROW))
+        self._fit_rows()
         self._fit()
+
+    @property
+    def _rows(self) -> int:
+        return max(self._model.rowCount(), 1)
+
+    @property
+    def _around_rows(self) -> int:
+        return self.horizontalHeader().sizeHint().height() + 2
+
+    def _high(self, row: int) -> int:
+        """Return how high it is with rows of this height, at text of 100 %."""
+        return self._rows * self._theme.px(row) + self._around_rows
+
+    def _fit_rows(self) -> None:
+        """Share the height among the rows."""
+        least, most = (self._theme.px(high) for high in (ROW, MOST_ROW))
+        share = (self.height() - self._around_rows) // self._rows
+        high = min(max(share, least), most) if self._fills else least
+        if high != self.verticalHeader().defaultSectionSize():
+            self.verticalHeader().setDefaultSectionSize(high)
 
     def _fit(self) -> None:
         """Every column as wide as what is in it; what has no room is left out whole."""

@@ -120,7 +120,8 @@ class Overview(QWidget):
         self._plots = [self._plot(kind) for kind in PLOTS]
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
         self._table = JointTable(self._model, theme)
-        self._joints.body.addWidget(self._table)
+        self._joints.body.addWidget(self._table, 1)
+        self._joints.body.addStretch(0)  # what is more than the rows may have
         self._wrong = JointWords(theme)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 3, 6, 3)
@@ -266,7 +267,9 @@ class Overview(QWidget):
             is_fixed = row < 2 or row == joints or row >= last
             share = PLOT_SHARE if is_plots and not self._is_low else PICTURE_SHARE
             grid.setRowStretch(row, 0 if is_fixed else share)
-        grid.setRowStretch(9, 1 if is_alone else 0)
+        if is_alone:
+            grid.setRowStretch(joints, 1)
+        self._table.fill(is_alone)
         for one in (self._joints, self):  # else a frame is drawn in which words lie over the table
             QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
 
@@ -278,7 +281,7 @@ class Overview(QWidget):
         if is_wide:
             self._joints.head.insertWidget(1, self._wrong, WORDS_SHARE)
         else:
-            self._joints.body.addWidget(self._wrong)
+            self._joints.body.insertWidget(1, self._wrong)
 
     def _cards_of_page(self) -> list[Card]:
         """Return the cards of the page that stand beside each other; hide those of the others."""
