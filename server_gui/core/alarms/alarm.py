@@ -45,12 +45,17 @@ class Alarm:
 
     @property
     def mark(self) -> Mark:
-        """How it is shown, wherever that is: as bad as the worst that it explains, and one word for each."""
+        """How it is shown, wherever that is: as bad as the worst that it explains, and one word for each.
+
+        Parts that are lost are counted in it: `computer halted, 6 lost`.
+        """
         own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
         shown = TEXTS[worst.kind].mark
         if shown.colour == own.colour:
             return own
-        return Mark(shown.shape, shown.colour, GRAVER.get(self.kind, own.word))
+        lost = sum(one.kind is Kind.LOST for one in self.under)
+        word = GRAVER.get(self.kind, own.word)
+        return Mark(shown.shape, shown.colour, f"{word}, {lost} lost" if lost else word)
 
     @property
     def rank(self) -> int:

@@ -1,7 +1,8 @@
 """One cause, one alarm: what follows from a computer that stood still, or a node that has gone, is under it.
 
 What is told under another alarm is neither hidden nor better for it: the one above has the worst mark of
-both, names all of it, and is over when all of it is.
+both, names all of it, and is over when all of it is. A part that is lost stands under a stall only where the
+stall explains it, and is counted in its word then.
 """
 
 import dataclasses
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.alarms.alarm import Active, Alarm
+from server_gui.core.alarms.overload import is_common, is_unplugged
 from server_gui.core.alarms.texts import Kind, check_of
 
 LATE_S: Final = 0.2  # without a row: so long is enough to miss heartbeats and PDOs
@@ -25,7 +27,8 @@ EPISODE_S: Final = 60.0  # between two stalls that are told as one
 TOLD_S: Final = 10.0  # how long a stall is told after which nothing was wrong
 OWN_S: Final = 30.0  # what lasts longer than that after a stall is not the stall's
 SUBJECT: Final = "computer"
-# What a stall makes look wrong. A drive in fault, a guard's stop and the link stand for themselves.
+# What a stall makes look wrong; a lost part where half of all are late (`is_common`), as a load does, and
+# nothing whose port is gone. A drive in fault, a guard's stop and the link stand for themselves.
 _OF_STALL: Final = frozenset(
     {Kind.IMPLAUSIBLE, Kind.LOST, Kind.PART_STALE, Kind.BUS, Kind.BUS_FAILS, Kind.BLIND, Kind.REPORTS}
 )
@@ -99,14 +102,17 @@ def stood_still(stalls: Sequence[Stall]) -> Iterator[Alarm]:
     yield Alarm(Kind.STALLED, SUBJECT, what, check=check, since_s=stalls[0].began_s)
 
 
-def gathered(active: Iterable[Active], stalls: Sequence[Stall], now_s: float) -> list[Active]:
-    """Return the alarms, those that another explains under that one."""
+def gathered(active: Iterable[Active], stalls: Sequence[Stall], now_s: float, parts: int) -> list[Active]:
+    """Return the alarms of a robot with so many parts, those that another explains under that one."""
     known = list(active)
+    of_stall = _of_stalls(known, stalls, now_s)
+    if not is_common((one.alarm for one in of_stall), parts):
+        of_stall = [one for one in of_stall if one.alarm.kind is not Kind.LOST]
     gone = [one for one in known if one.alarm.kind in _GONE and one.alarm.node]
     stood = next((one for one in known if one.alarm.kind is Kind.STALLED), None)
     under: dict[tuple[Kind, str], list[Active]] = {}
     for one in known:
-        cause = _cause(one, gone, stood, stalls, now_s)
+        cause = _cause(one, gone, stood, of_stall)
         if cause is not None:
             under.setdefault(cause.alarm.key, []).append(one)
     explained = {one.alarm.key for found in under.values() for one in found}
@@ -118,23 +124,31 @@ def gathered(active: Iterable[Active], stalls: Sequence[Stall], now_s: float) ->
 
 
 def _cause(
-    one: Active, gone: Sequence[Active], stood: Active | None, stalls: Sequence[Stall], now_s: float
+    one: Active, gone: Sequence[Active], stood: Active | None, of_stall: Sequence[Active]
 ) -> Active | None:
     """Return the alarm that explains this one.
 
     That of a stall before that of a node, which may be the stall's.
     """
-    if stood is not None and _is_of_stall(one, stalls, now_s):
+    if stood is not None and one in of_stall:
         return stood
-    alone = [cause for cause in gone if stood is None or not _is_of_stall(cause, stalls, now_s)]
+    alone = [cause for cause in gone if stood is None or cause not in of_stall]
     return next((cause for cause in alone if _is_of_node(one, cause)), None)
 
 
-def _is_of_stall(one: Active, stalls: Sequence[Stall], now_s: float) -> bool:
-    return one.alarm.kind in _OF_STALL and any(
-        stall.began_s - BEFORE_S <= one.since_s <= stall.ended_s + AFTER_S and now_s <= stall.ended_s + OWN_S
-        for stall in stalls
-    )
+def _of_stalls(known: Sequence[Active], stalls: Sequence[Stall], now_s: float) -> list[Active]:
+    """Return what began with a stall and may be its own."""
+    return [
+        one
+        for one in known
+        if one.alarm.kind in _OF_STALL
+        and not is_unplugged(one.alarm)
+        and any(
+            stall.began_s - BEFORE_S <= one.since_s <= stall.ended_s + AFTER_S
+            and now_s <= stall.ended_s + OWN_S
+            for stall in stalls
+        )
+    ]
 
 
 def _is_of_node(one: Active, cause: Active) -> bool:

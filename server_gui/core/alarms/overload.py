@@ -36,6 +36,11 @@ def is_unplugged(alarm: Alarm) -> bool:
     return any(word in alarm.what for word in UNPLUGGED)
 
 
+def is_common(alarms: Iterable[Alarm], parts: int) -> bool:
+    """Return whether of so many parts half or more are late: a computer makes all of them so, a cable one."""
+    return 2 * sum(one.kind in PARTS for one in alarms) >= parts
+
+
 def load_first(
     alarms: Iterable[Alarm], first: tuple[str, ...], parts: int, *, wired: bool = True
 ) -> Iterator[Alarm]:
@@ -47,13 +52,13 @@ def load_first(
     """
     found = list(alarms)
     late = [one for one in found if one.kind in SILENT | BUSES and not is_unplugged(one)]
-    is_common = not wired or 2 * sum(one.kind in PARTS for one in late) >= parts
+    is_of_all = not wired or is_common(late, parts)
     every = first
     for one in found:
         first = tuple(said for said in every if said != THEIRS or THEIR_LOAD not in one.what)
         if not first or one not in late:
             yield one
-        elif one.kind in PARTS and not is_common:
+        elif one.kind in PARTS and not is_of_all:
             also = (text.replace(" first", "") for text in first)
             yield dataclasses.replace(one, check=ALSO.join(filter(None, (one.check, *also))))
         else:

@@ -172,7 +172,10 @@ class Station:
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(
-            found(facts), now_s, self.rings.newest_ns, lambda active: gathered(active, stalls, now_s)
+            found(facts),
+            now_s,
+            self.rings.newest_ns,
+            lambda active: gathered(active, stalls, now_s, len(self.robot.parts)),
         )
         self._judged = moment  # by all of it: what raises half-way is looked for again
         return self._alarms

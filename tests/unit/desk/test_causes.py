@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from gateway.client import Batch, ClockOffset
 from gateway.wire.component import QualityInfo, Snapshot
-from server_gui.core.alarms.alarm import Active, Alarm
+from server_gui.core.alarms.alarm import Active, Alarm, Alarms
 from server_gui.core.alarms.causes import AFTER_S, OWN_S, TOLD_S, Stall, Stalls, gathered, stood_still
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
@@ -17,6 +17,7 @@ from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walk
 
 SECOND_NS = 1_000_000_000
 STALL = Stall(100.0, 1.2)
+PARTS = 10  # of the robot
 HEARTBEAT = "it reports 0x8130 life guard or heartbeat error (register: generic, communication)"
 
 
@@ -63,7 +64,7 @@ def test_another_link_or_stream_blames_nobody() -> None:
 def test_a_flood_after_a_stall_is_one_alarm_as_bad_as_its_worst() -> None:
     flood = [active(Kind.IMPLAUSIBLE, joint, 101.5) for joint in JOINTS]
     flood += [active(Kind.BUS, "bus.can0", 103.0), active(Kind.PART_STALE, "gait", 100.9)]
-    (one,) = gathered([stood(), *flood], (STALL,), 104.0)
+    (one,) = gathered([stood(), *flood], (STALL,), 104.0, PARTS)
     assert one.alarm.line == "computer halted: computer: the robot's computer stood still for 1.2 s"
     assert (one.alarm.mark.colour, one.alarm.mark.word) == ("bad", "computer halted")
     assert "unreliable: left hip, left knee" in one.alarm.consequences
@@ -82,19 +83,51 @@ def test_a_flood_after_a_stall_is_one_alarm_as_bad_as_its_worst() -> None:
     ],
 )
 def test_what_a_stall_does_not_explain_stands_for_itself(kind: Kind, since_s: float, now_s: float) -> None:
-    found = gathered([stood(), active(kind, "left_knee", since_s)], (STALL,), now_s)
+    found = gathered([stood(), active(kind, "left_knee", since_s)], (STALL,), now_s, PARTS)
     assert kind in [one.alarm.kind for one in found]
 
 
+def each_lost(*names: str, what: str = "no heartbeat") -> list[Active]:
+    """Parts that are lost since the stall."""
+    return [active(Kind.LOST, name, 101.0, what) for name in names]
+
+
+def test_a_stall_explains_lost_parts_where_half_of_all_are_late_and_its_word_counts_them() -> None:
+    late = [active(Kind.PART_STALE, name, 101.0) for name in ("gait", "trunk")]
+    (one,) = gathered([stood(), *each_lost(*JOINTS[:3]), *late], (STALL,), 102.0, PARTS)
+    assert one.alarm.kind is Kind.STALLED
+    assert (one.alarm.mark.colour, one.alarm.mark.word) == ("bad", "computer halted, 3 lost")
+    assert "lost: left hip" in one.alarm.consequences
+    assert one.alarm.rank == each_lost("any")[0].alarm.rank
+
+
+def test_a_part_that_is_lost_with_a_stall_while_most_are_well_leads() -> None:
+    stale = active(Kind.PART_STALE, "gait", 101.0)
+    alarms = Alarms()
+    found = [stood().alarm, *(one.alarm for one in (*each_lost("left_knee"), stale))]
+    alarms.look(found, 101.0, gather=lambda known: gathered(known, (STALL,), 102.0, PARTS))
+    first, second = alarms.active
+    assert (first.alarm.kind, first.alarm.subject) == (Kind.LOST, "left_knee")
+    assert (second.alarm.kind, [one.subject for one in second.alarm.under]) == (Kind.STALLED, ["gait"])
+    assert alarms.worst is not None
+    assert alarms.worst.kind is Kind.LOST, "as its card says"
+
+
+def test_no_stall_takes_a_port_away() -> None:
+    gone = each_lost(*JOINTS, what="/dev/ttyUSB0 does not exist")
+    found = gathered([stood(), *gone], (STALL,), 102.0, PARTS)
+    assert [one.alarm.subject for one in found if one.alarm.kind is Kind.LOST] == list(JOINTS)
+
+
 def test_a_stall_after_which_nothing_is_wrong_is_told_for_a_while() -> None:
-    assert gathered([stood()], (STALL,), STALL.ended_s + TOLD_S - 0.1)
-    assert gathered([stood()], (STALL,), STALL.ended_s + TOLD_S + 0.1) == []
+    assert gathered([stood()], (STALL,), STALL.ended_s + TOLD_S - 0.1, PARTS)
+    assert gathered([stood()], (STALL,), STALL.ended_s + TOLD_S + 0.1, PARTS) == []
 
 
 def test_a_short_stall_is_told_only_of_what_it_explains() -> None:
     short = (Stall(100.0, 0.3),)
-    assert gathered([stood(short)], short, 101.0) == []
-    (one,) = gathered([stood(short), active(Kind.IMPLAUSIBLE, "left_knee", 101.0)], short, 102.0)
+    assert gathered([stood(short)], short, 101.0, PARTS) == []
+    (one,) = gathered([stood(short), active(Kind.IMPLAUSIBLE, "left_knee", 101.0)], short, 102.0, PARTS)
     assert one.alarm.what == "the robot's computer stood still for 0.3 s"
 
 
@@ -105,7 +138,7 @@ def test_a_node_that_has_gone_stands_above_those_that_miss_its_heartbeat(kind: K
         active(kind, "gait", 100.1, HEARTBEAT, "main"),
         active(Kind.BUS, "bus.main", 101.0, "32 error frames in the last 10 s"),
     ]
-    (one,) = gathered([*others, lost], (), 105.0)
+    (one,) = gathered([*others, lost], (), 105.0, PARTS)
     assert one.alarm.kind is Kind.LOST
     assert one.alarm.subject == "left_knee"
     assert [under.subject for under in one.alarm.under] == ["gait", "bus.main"]
@@ -122,7 +155,10 @@ def test_a_node_that_has_gone_stands_above_those_that_miss_its_heartbeat(kind: K
 )
 def test_what_a_node_that_has_gone_does_not_explain_stands_for_itself(other: Active) -> None:
     lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat has been missing for 2.2 s", "main")
-    assert [one.alarm.key for one in gathered([other, lost], (), 105.0)] == [other.alarm.key, lost.alarm.key]
+    assert [one.alarm.key for one in gathered([other, lost], (), 105.0, PARTS)] == [
+        other.alarm.key,
+        lost.alarm.key,
+    ]
 
 
 def test_a_robot_whose_computer_stood_still_says_so_and_its_worst_stays_the_worst() -> None:
