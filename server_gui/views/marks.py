@@ -25,6 +25,7 @@ __all__ = [
     "STILL_ENABLED",
     "Mark",
     "age_text",
+    "day_and_time",
     "draw",
     "drives_mark",
     "enabled_text",
@@ -95,3 +96,10 @@ def _polygon(shape: str, box: QRectF) -> QPolygonF:
 def time_of_day(utc_s: float) -> str:
     """Return an instant by the local clock."""
     return f"{datetime.datetime.fromtimestamp(utc_s, datetime.UTC).astimezone():%H:%M:%S}"
+
+
+def day_and_time(utc_s: float) -> str:
+    """Return an instant by the local clock, with its day where that is not today."""
+    then = datetime.datetime.fromtimestamp(utc_s, datetime.UTC).astimezone()
+    is_today = then.date() == datetime.datetime.now().astimezone().date()
+    return f"{then:%H:%M:%S}" if is_today else f"{then:%Y-%m-%d %H:%M}"

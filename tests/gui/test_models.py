@@ -17,6 +17,7 @@ from server_gui.core.models.models import Tone
 from server_gui.core.models.training import NOT_COMPARED, Trained
 from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Tried
 from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.marks import day_and_time
 from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.theme import Theme
@@ -148,7 +149,7 @@ def test_the_page_knows_of_a_store_that_is_gone_before_its_first_frame(
     page.show()
     assert not page.promote.isEnabled(), "as the rest of the window knows"
     assert page.state.text().startswith("▲ The store is not reached")
-    assert "as known before" in page.compare.note, "also where the list is out of sight"
+    assert "as known at " in page.compare.note, "also where the list is out of sight"
 
 
 def test_what_training_has_said_of_a_model_is_read_again_before_it_is_promoted(
@@ -291,20 +292,42 @@ def test_too_few_wearers_are_said_in_words(
     assert page.said.property("tone") == "bad"
 
 
-def test_a_store_that_is_gone_is_a_sentence_above_the_list(
+def away(self: Registry, task: str | None = None) -> list[Card]:
+    """Fail as a look at a store does that does not answer."""
+    raise OSError("s3://lab cannot be reached: Connection refused")
+
+
+def test_a_store_that_is_gone_leaves_what_was_known_and_says_how_many_and_of_when(
     shown: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = opened(shown)
-
-    def away(self: Registry, task: str | None = None) -> list[Card]:
-        raise OSError("s3://lab cannot be reached: Connection refused")
+    assert page._list.note == "2 models"
+    known_s = archive.models.known_s
+    assert known_s is not None
 
     monkeypatch.setattr(Registry, "entries", away)
     archive.models.look(now=True)
     shown.until(lambda: "Connection refused" in page.state.text(), "said so")
     assert page.state.isVisible()
-    assert page.chosen is None
+    when = day_and_time(known_s)
+    assert f"Below is what was known at {when}, 2 models; there may be others by now" in page.state.text()
+    assert page._list.note == f"The list of models is not read: 2 models as known at {when}"
+    assert page.rows.rowCount() == 2
+    assert archive.models.known_s == known_s, "it is no newer for having been asked for"
     assert not page.promote.isEnabled()
+    assert "nothing can be promoted" in page.promote.toolTip()
+
+
+def test_a_store_that_was_never_read_may_have_more_than_what_is_listed(
+    shown: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Registry, "entries", away)
+    shown.open("Models")
+    page = shown.window.tabs.models
+    shown.until(lambda: "Connection refused" in page.state.text(), "said so")
+    assert page._list.note == "The list of models is not read: 0 models at least"
+    assert "It was not read yet: there may be more than the 0 models below" in page.state.text()
+    assert "No model is known here" not in page.state.text()
 
 
 @pytest.mark.parametrize("scale", [1.5, 1.0])

@@ -114,9 +114,14 @@ def open_registry(url: str, *, given: bool = True) -> Registry:
 
     """
     place = checked_url(url)
-    if given and place.startswith("file://") and not Path(urlsplit(place).path).is_dir():
+    if given and not _is_there(place):
         raise StoreError(f"there is no store at {place}")
     return Registry(place, sign=desk_signature())
+
+
+def _is_there(place: str) -> bool:
+    """Return whether the folder of a store is there; any other is asked by what reads it."""
+    return not place.startswith("file://") or Path(urlsplit(place).path).is_dir()
 
 
 def why_it_cannot_serve(registry: Registry, model: str) -> str:
@@ -136,11 +141,13 @@ class Looking:
         self._url = url
         self._promoters = promoters
         self._record: TrackRecord | None = None
+        self._was_there = False  # a store that was there once is no new one when it is gone
 
     def look(self, robots: Set[str], ending: Callable[[], bool] = lambda: False) -> Catalogue:
         """Return the present catalogue; blocks. Errors are entered in it as problems."""
         try:
-            registry = open_registry(self._url, given=False)
+            registry = open_registry(self._url, given=self._was_there)
+            self._was_there = _is_there(checked_url(self._url))
             hits, hits_problem = self._hits(robots, ending)
             entries = tuple(reversed(list(_entries(registry, hits, self._promoters))))
             return Catalogue(entries, tuple(registry.damaged().values()), "", hits_problem)

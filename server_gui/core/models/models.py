@@ -49,7 +49,8 @@ class Models:
         self.url = url
         self.reach = reach or StoreReach()  # of the store
         self.knock: Callable[[], None] = lambda: None  # see at once whether it is reached
-        self.found = Catalogue()
+        self.found = Catalogue()  # by the newest look that read the store; its problem is of the newest one
+        self.known_s: float | None = None  # when that look came back (UTC); None: the store was never read
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
         self.change: ModelChange | None = None  # what waits to be confirmed
@@ -76,9 +77,14 @@ class Models:
         ended = [part.close(within_s) for part in (self.jobs, self._thread)]
         return all(ended)
 
+    @property
+    def is_reached(self) -> bool:
+        """Whether what was found is what the store has."""
+        return self.reach.problem is None and not self.found.problem
+
     def look(self, *, now: bool = False) -> None:
         """Look again where it is time, or at once."""
-        wait_s = AGAIN_S if self.found.problem else LOOK_S
+        wait_s = LOOK_S if self.is_reached else AGAIN_S
         due = self.looked_s is None or time.monotonic() - self.looked_s >= wait_s
         if self._looks or not (now or due):
             return
@@ -176,6 +182,10 @@ class Models:
     def _looked(self, found: Catalogue) -> None:
         self._looks, self.looked_s = False, time.monotonic()
         self.revision += 1
+        if self.reach.problem is None and not found.problem:
+            self.known_s = time.time()
+        elif self.known_s is not None:  # what a store has that is away is what it had
+            found = replace(self.found, problem=found.problem)
         self.found = found
         listed, self._results = self._results[: self._lists], self._results[self._lists :]
         for text, tone in listed:

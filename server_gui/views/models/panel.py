@@ -6,12 +6,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from gateway.amounts import counted
 from server_gui.core.cloud.store_reach import AGAIN, Reach
 from server_gui.core.desk.desk import Desk
 from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.models import Models
 from server_gui.core.models.training import TrainingWish
 from server_gui.processes.training import training
+from server_gui.views.marks import day_and_time
 from server_gui.views.models.compare import Compare
 from server_gui.views.models.confirm import Confirm
 from server_gui.views.models.models_table import ModelsModel, ModelsTable
@@ -32,11 +34,13 @@ EMPTY: Final = (
 PROMOTES: Final = "Let the selected model serve, after showing the change"
 ROLLS_BACK: Final = "Return to the previous model, after showing the change"
 TRAINS: Final = "Choose what to learn and who judges it; nothing serves another model before it is promoted"
-UNREACHED: Final = "The store is not reached: nothing can be promoted or rolled back until it is"
-NO_LESSONS: Final = "The store is not reached: nothing can be learned from until it is"
-SHORT: Final = "as known before"
-BEFORE: Final = "store not reached: as known before"
-AWAY: Final = f"▲ The store is not reached, {AGAIN}. Below is what was known before: {{why}}"
+NO_CHANGE: Final = "{trouble}: nothing can be promoted or rolled back until it is"
+NO_LESSONS: Final = "{trouble}: nothing can be learned from until it is"
+NOT_REACHED: Final = "The store is not reached"
+NOT_READ: Final = "The list of models is not read"
+AWAY: Final = f"▲ {{trouble}}, {AGAIN}. {{below}}: {{why}}"
+BELOW: Final = "Below is what was known at {when}, {count}; there may be others by now"
+NEVER: Final = "It was not read yet: there may be more than the {count} below"
 
 
 class ModelsPage(QWidget):
@@ -174,22 +178,21 @@ class ModelsPage(QWidget):
             self._models.ask_rollback(entry.card.task, str(self.robot.currentData()))
 
     def _show_state(self) -> None:
-        found = self._models.found
-        reach = self._models.reach
-        away = reach.problem
-        lines = [] if away is None else [AWAY.format(why=away)]
+        models, found, reach = self._models, self._models.found, self._models.reach
+        away = reach.problem or found.problem
+        lines = [AWAY.format(trouble=self._trouble, below=self._below, why=away)] if away else []
         lines += [f"▲ Store: {reach.said}"] if reach.state is Reach.FAILING else []
         lines += [f"▲ {found.problem}"] if found.problem and found.problem != away else []
         lines += [f"▲ {each}" for each in found.damaged]
-        if self._models.looked_s is None:
+        if models.looked_s is None:
             lines.append(LOOKING)
-        elif not found.entries and not found.problem and away is None:
+        elif not found.entries and not away:
             lines.append(EMPTY)
         set_text(self.state, "\n".join(lines))
         self.state.setVisible(bool(lines))
-        set_text(self.said, self._models.said)
-        self.said.setVisible(bool(self._models.said))
-        tone = self._models.tone.value
+        set_text(self.said, models.said)
+        self.said.setVisible(bool(models.said))
+        tone = models.tone.value
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)
@@ -203,13 +206,37 @@ class ModelsPage(QWidget):
 
     def _show_actions(self, entry: Entry | None) -> None:
         asked = self._models.change is not None
-        is_reached = self._models.reach.problem is None
+        trouble = self._trouble
         for button, does in ((self.promote, PROMOTES), (self.back, ROLLS_BACK)):
-            button.setEnabled(entry is not None and not asked and is_reached)
-            set_tip(button, does if is_reached else UNREACHED)
-        self.new.setEnabled(is_reached or self.new.isChecked())
-        set_tip(self.new, TRAINS if is_reached else NO_LESSONS)
-        training_now = " · training" if self._models.is_training else ""
-        known = "" if is_reached else f"{BEFORE} · "
-        self._list.set_note(f"{known}{len(self._models.found.entries)} models{training_now}")
-        self.compare.set_note("" if is_reached else BEFORE, "" if is_reached else SHORT)
+            button.setEnabled(entry is not None and not asked and not trouble)
+            set_tip(button, NO_CHANGE.format(trouble=trouble) if trouble else does)
+        self.new.setEnabled(not trouble or self.new.isChecked())
+        set_tip(self.new, NO_LESSONS.format(trouble=trouble) if trouble else TRAINS)
+        count = counted(len(self._models.found.entries), "model")
+        if trouble:
+            self._list.set_note(f"{trouble}: {count} {self._as_of}", f"{count} {self._as_of}")
+            self.compare.set_note(f"{trouble}: {self._as_of}", self._as_of)
+        else:
+            self._list.set_note(f"{count}{' · training' if self._models.is_training else ''}")
+            self.compare.set_note("")
+
+    @property
+    def _trouble(self) -> str:
+        """Why the list may not be what there is; empty where it is."""
+        if self._models.is_reached:
+            return ""
+        return NOT_REACHED if self._models.reach.problem is not None else NOT_READ
+
+    @property
+    def _as_of(self) -> str:
+        """When the list was read last."""
+        known_s = self._models.known_s
+        return "at least" if known_s is None else f"as known at {day_and_time(known_s)}"
+
+    @property
+    def _below(self) -> str:
+        """What the list is while the store is away."""
+        count, known_s = counted(len(self._models.found.entries), "model"), self._models.known_s
+        if known_s is None:
+            return NEVER.format(count=count)
+        return BELOW.format(when=day_and_time(known_s), count=count)

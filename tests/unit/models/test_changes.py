@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import msgspec
 import pytest
@@ -134,6 +135,19 @@ def test_a_store_that_is_gone_is_a_problem_in_words(
     assert (found.entries, found.problem) == ((), "s3://lab cannot be reached: Connection refused")
 
 
+def test_a_store_whose_folder_has_gone_is_no_new_one_without_models(
+    registry: Registry, tmp_path: Path
+) -> None:
+    publish(registry)
+    looking = Looking(registry.url)
+    assert len(looking.look(set()).entries) == 1
+    folder = Path(urlsplit(registry.url).path)
+    folder.rename(tmp_path / "elsewhere")
+    found = looking.look(set())
+    assert (found.entries, found.problem) == ((), f"there is no store at {registry.url}")
+    assert Looking(registry.url).look(set()).problem == "", "it may be one that nothing was put into yet"
+
+
 # --- as the window has it
 
 
@@ -158,6 +172,32 @@ def desk(registry: Registry) -> Iterator[Desk]:
     made = Desk(registry.url)
     yield made
     assert made.models.close(30.0)
+
+
+def test_what_was_found_stays_with_its_time_while_the_store_is_away(
+    desk: Desk, registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish(registry)
+    models = desk.models
+
+    def look() -> None:
+        before = models.revision
+        models.look(now=True)
+        desk.until(lambda: models.revision > before)
+
+    look()
+    known_s = models.known_s
+    assert known_s is not None
+    models.reach.problem = "Connection refused"
+    monkeypatch.setattr(Registry, "entries", lambda *_: [])  # what is left without it
+    look()
+    assert (len(models.found.entries), models.known_s) == (1, known_s)
+    assert not models.is_reached
+    models.reach.problem = None
+    look()
+    assert models.found.entries == ()
+    assert models.is_reached
+    assert models.known_s > known_s
 
 
 def test_nothing_is_promoted_before_it_is_confirmed(desk: Desk, registry: Registry) -> None:
