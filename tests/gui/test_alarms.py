@@ -310,7 +310,8 @@ def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_
     bench.draw(window)
     window.alarms.buttons.show_signal.click()
     assert window.tabs.currentIndex() == 1
-    assert window.tabs.signals.chosen == ["left_knee.current"]
+    drawn = [plot.drawn for plot in window.tabs.signals.plots]
+    assert drawn == [(f"left_knee.{name}",) for name in ("current", "torque", "position", "velocity")]
     assert window.tabs.signals.pause.isChecked()
     left, right = window.tabs.signals.plots[0].plot.window_s
     assert -8.0 < left <= -5.0

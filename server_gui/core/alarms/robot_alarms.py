@@ -53,7 +53,7 @@ _SHOWN_BY: Final = (
     ("71", ("torque", "current")),
     ("83", ("torque", "current")),
     ("84", ("velocity",)),
-    ("86", ("following_error", "target", "position")),
+    ("86", ("following_error", "target_position", "position")),
 )
 _KINDS: Final = {
     "fault": Kind.IMPLAUSIBLE,

@@ -176,7 +176,7 @@ class AlarmButtons(QWidget):
         super().__init__()
         self.clear = QPushButton("Clear fault…")
         self.clear.setToolTip("Reset the drives' fault: they go to switch on disabled, none is enabled")
-        self.show_signal = QPushButton("Show the signal ± 5 s")
+        self.show_signal = QPushButton("Show the signals ± 5 s")
         self.show_resources = QPushButton("Resources")
         self.show_resources.setToolTip(HINT_RESOURCES)
         self.acknowledge = QPushButton("Acknowledge")

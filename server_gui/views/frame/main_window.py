@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.units import UNITS, Units
+from server_gui.core.alarms.explaining_signals import explaining_signals
 from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.stages import Stage
@@ -246,12 +247,13 @@ class MainWindow(QMainWindow):
         self.tabs.look_at(self.tabs.signals)
 
     def show_around(self, station: Station, channel: str, at_ns: int) -> None:
-        """Show a channel, or those that are shown, before and after an instant of a robot's signals."""
+        """Show what explains a channel, or what is shown, around an instant of a robot's signals."""
         self._desk.select(station)
         signals = self.tabs.signals
         self.tabs.look_at(signals)
         signals.refresh()
-        signals.show_around((channel,) if channel else (), at_ns)
+        explaining = explaining_signals(station.robot.description, channel) if channel else ()
+        signals.show_around(explaining, at_ns)
 
     def _show_resources(self, station: Station) -> None:
         """Show what keeps a robot's computer busy."""

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from gateway.plain_text import plain
 from ml.store.sessions import Session
+from server_gui.core.alarms.explaining_signals import explaining_signals
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.cycle_remarks import CycleRemarks
 from server_gui.core.archive.playback import SPEEDS, Playback, PlayedRobot
@@ -184,7 +185,7 @@ class Player(QWidget):
         self._choice.button(SIGNALS).click()
 
     def show_around(self, channel: str, at_ns: int) -> None:
-        """Show a channel before and after an instant of its signals: what comes after it is read first."""
+        """Show what explains a channel before and after an instant: what comes after it is read first."""
         robot = self._playback.desk.stations[0].robot
         if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
             self._playback.play(on=False)
@@ -201,7 +202,8 @@ class Player(QWidget):
         if self._around is not None and not playback.is_loading:
             (channel, at_ns), self._around = self._around, None
             self.signals.refresh()
-            self.signals.show_around((channel,), at_ns)
+            description = playback.desk.stations[0].robot.description
+            self.signals.show_around(explaining_signals(description, channel), at_ns)
         self._refresh_beside()
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)

@@ -158,10 +158,10 @@ class Signals(QWidget):
         return self.channels.chosen
 
     def choose(self, names: Sequence[str]) -> None:
-        """Tick exactly these, and arrange them by their units."""
+        """Show exactly these, channels or expressions, in this order; those of one unit share a plot."""
         self.channels.choose(names)
         if self._desk.selected is not None:
-            self._arrange(self._desk.selected)
+            self._arrange(self._desk.selected, names)
         self._build()
 
     def show_around(self, names: Sequence[str], at_ns: int) -> None:
@@ -262,7 +262,7 @@ class Signals(QWidget):
             self.scene.look(station)
             if not self._begun:
                 self._begun = bool(self.channels.items)
-                self._arrange(station)
+                self._arrange(station, self.chosen)
             self.channels.choose(self.scene.workspace.curves)
             self.expression.show_channels([*self.scene.channels])
             self._build()
@@ -277,9 +277,9 @@ class Signals(QWidget):
         self.channels.choose(self.scene.workspace.curves)
         self._build()
 
-    def _arrange(self, station: Station) -> None:
+    def _arrange(self, station: Station, names: Sequence[str]) -> None:
         self.scene.look(station)
-        self.scene.workspace.arrange(map(self.scene.meaning, self.chosen))
+        self.scene.workspace.arrange(map(self.scene.meaning, names))
         self.scene.look(station)
 
     def _ticked(self, item: QTreeWidgetItem) -> None:

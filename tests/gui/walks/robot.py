@@ -109,10 +109,10 @@ def drive_fault(bench: Bench) -> None:
     bench.robot.break_("overcurrent", "right_hip")
     hand.sees("fault: right hip", "0x2310")
     hand.misses("No alarms")
-    if not hand.can_see("Show the signal ± 5 s"):
+    if not hand.can_see("Show the signals ± 5 s"):
         hand.click("fault: right hip")
     hand.keep("fault")
-    hand.insist("Show the signal ± 5 s", lambda: hand.reads("right_hip."))
+    hand.insist("Show the signals ± 5 s", lambda: hand.reads("right_hip."))
     hand.keep("fault-signal")
     hand.click("Overview")
     clear_fault(hand, "fault: right hip")
@@ -135,9 +135,9 @@ def fault_replayed(bench: Bench) -> None:
         hand.click("Pause", exactly=True)
     hand.misses("Clear fault…") if not hand.can_see("Clear fault…") else None
     hand.keep("replay-fault")
-    if not hand.can_see("Show the signal ± 5 s"):
+    if not hand.can_see("Show the signals ± 5 s"):
         hand.click("fault: right hip", place=-1)
-    hand.insist("Show the signal ± 5 s", lambda: hand.reads("right_hip."), place=-1)
+    hand.insist("Show the signals ± 5 s", lambda: hand.reads("right_hip."), place=-1)
     hand.keep("replay-fault-signal")
     hand.click("← All")
     hand.key("F9")
