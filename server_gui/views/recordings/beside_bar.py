@@ -101,7 +101,8 @@ class BesideBar(QWidget):
             parts.append((bad, "▲", f"it cannot be shown beside{again}: {beside.problem}"))
         elif second is None:
             parts.append((other, BESIDE, "reading …"))
-        return [*parts, *([(bad, "▲", self._refused)] if self._refused else [])]
+        remark = [(css(self._theme, "dim"), "", beside.remark)] if beside.remark else []
+        return [*parts, *remark, *([(bad, "▲", self._refused)] if self._refused else [])]
 
     def _align(self, place: int) -> None:
         self._refused = self._beside.align(list(By)[place])

@@ -57,7 +57,7 @@ GOES_ON: Final = "goes on"
 NOW: Final = "recorded now"
 NOT_KNOWN: Final = "not known while the store is not reached"
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
-TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
+TOGETHER: Final = "Both in the same plots, played together: aligned by a heel strike or their beginnings"
 COMPARING: Final = "Differences in the set-up of the later one, and measures of the walk that moved with it"
 
 

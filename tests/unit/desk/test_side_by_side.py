@@ -10,11 +10,12 @@ import pytest
 
 from ml.store import StoreError
 from ml.store.sessions import Session
-from server_gui.core.archive.playback import Playback
-from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, By, SideBySide
+from server_gui.core.archive.playback import Playback, PlayedRobot
+from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, NO_STEPS, NOT_READ, By, SideBySide
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Shown
 from server_gui.core.desk.flags import FlagKind
+from server_gui.core.recording.rows import Floats, Ints
 from server_gui.core.settings.server_file import ServerSettings
 
 SECOND_NS = 1_000_000_000
@@ -41,14 +42,36 @@ class KneeTape:
         if self.away:
             raise StoreError("the store is away")
         utc_ns = np.arange(max(begin_ns, self.first_ns), min(end_ns, self.last_ns), SECOND_NS // 10)
-        return Rows(utc_ns, utc_ns - 1000 * SECOND_NS, {"left_knee.position": utc_ns / 1e18})
+        return Rows(utc_ns, utc_ns - 1000 * SECOND_NS, self.columns(utc_ns))
+
+    def columns(self, utc_ns: Ints) -> dict[str, Floats]:
+        """What is in these rows."""
+        return {"left_knee.position": utc_ns / 1e18}
+
+
+class SteppingTape(KneeTape):
+    """A left insole too, which stands on the ground, and from `lands_s` on lands each second."""
+
+    units: Mapping[str, str] = {"left_knee.position": "rad", "left_insole.force": "N"}
+
+    def __init__(self, name: str, first_s: int, lands_s: int) -> None:
+        super().__init__(name, first_s)
+        self.lands_s = lands_s
+
+    def columns(self, utc_ns: Ints) -> dict[str, Floats]:
+        since_s = (utc_ns - self.first_ns) / 1e9
+        is_up = (since_s > self.lands_s - 0.55) & (since_s % 1.0 > 0.45)
+        return super().columns(utc_ns) | {"left_insole.force": np.where(is_up, 0.0, 700.0)}
 
 
 class Beside:
     """Both of them, in a thread that does at once what it is given, and a clock that a test moves."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.tape, self.second = KneeTape("first", 1_700_000_000), KneeTape("second", 1_700_100_000)
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, first: KneeTape | None = None, second: KneeTape | None = None
+    ) -> None:
+        self.tape = first or KneeTape("first", 1_700_000_000)
+        self.second = second or KneeTape("second", 1_700_100_000)
         self.now_s = 100.0
         self.held: list[Callable[[], None]] | None = None  # what is done later, while a test holds it
         monkeypatch.setattr(Tape, "open", lambda _settings, _session: self.second)
@@ -155,10 +178,60 @@ def test_a_recording_that_is_read_when_nobody_wants_it_any_more_is_not_shown(bes
 
 
 def test_without_a_heel_strike_the_beginnings_stay_aligned(beside: Beside) -> None:
-    assert "no heel strike" in beside.both.align(By.HEEL_STRIKE)
+    assert beside.both.remark == NO_STEPS
+    for by in (By.LAST_STRIKE, By.FIRST_STRIKE):
+        assert "no left heel strike" in beside.both.align(by)
     assert beside.both.by is By.START
     beside.jump(5.0)
     assert beside.is_together
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> Beside:
+    """The left foot lands first after five seconds, in the second one after two."""
+    tapes = (SteppingTape("first", 1_700_000_000, 5), SteppingTape("second", 1_700_100_000, 2))
+    made = Beside(monkeypatch, *tapes)
+    made.both.open(made.second.session)
+    made.draw()
+    return made
+
+
+def apart_s(beside: Beside) -> float:
+    """How much later the second is shown than the first, since their beginnings."""
+    first, second = beside.first.position_ns, beside.both.second.position_ns
+    return (second - beside.second.first_ns - first + beside.tape.first_ns) / 1e9
+
+
+def test_both_are_aligned_by_their_first_left_heel_strike_until_somebody_chooses_their_beginnings(
+    steps: Beside,
+) -> None:
+    assert (steps.both.by, steps.both.remark) == (By.FIRST_STRIKE, "")
+    steps.jump(20.0)
+    assert apart_s(steps) == pytest.approx(-3.0, abs=0.01)
+    assert not steps.both.align(By.START)
+    steps.jump(21.0)
+    assert (steps.both.by, apart_s(steps)) == (By.START, 0.0)
+    assert not steps.both.align(By.FIRST_STRIKE)
+    steps.jump(22.0)
+    assert apart_s(steps) == pytest.approx(-3.0, abs=0.01)
+
+
+def test_before_its_beginning_the_second_has_no_row_and_then_its_first(steps: Beside) -> None:
+    station = steps.both.station
+    assert station is not None
+    for seconds in (1.0, 20.0, 1.0):
+        steps.jump(seconds)
+        assert (station.rings.newest_ns is None) is (seconds < 3.0), "its first row is of another instant"
+    assert station.robot.description is not None, "its channels can be chosen"
+    steps.jump(4.0)
+    assert isinstance(station.robot, PlayedRobot)
+    assert station.robot.row_ns == steps.second.first_ns + SECOND_NS - SECOND_NS // 10
+
+
+def test_steps_that_cannot_be_read_are_not_called_none(beside: Beside) -> None:
+    beside.tape.away = True
+    beside.both.open(beside.second.session)
+    assert (beside.both.by, beside.both.remark) == (By.START, NOT_READ)
 
 
 def test_what_happened_in_the_second_stands_on_the_axis_of_the_first(beside: Beside) -> None:
