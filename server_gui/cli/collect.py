@@ -25,6 +25,7 @@ from server_gui.core.prediction.state import (
     DangerReport,
     Figures,
     PredictingState,
+    Quality,
     TaskReport,
 )
 from server_gui.core.recording.records import Worn
@@ -42,7 +43,7 @@ HEADER = (
 )  # fmt: skip
 RIGHT = range(5, len(HEADER))
 PREDICTED = ("robot", "task", "says", "probability", "age", "trust", "model")
-LABELLED = ("robot", "task", "model", "labelled", "right", "wrong", "not said")
+LABELLED = ("robot", "task", "model", "labelled", "recordings", "right", "wrong", "not said")
 
 EPILOG = """A robot's data is saved in the spool on this computer first, and goes to the store in batches;
 nothing is decimated, and what is missing is recorded as an event. Each robot is followed separately: one that
@@ -220,14 +221,19 @@ def _labelled(found: Figures) -> str:
     if not found:
         return f"no prediction of the last {WITHIN_DAYS} days is labelled in the store (gwrms label)\n"
     rows = [
-        (robot, task, model, str(quality.labelled), *quality.shares)
+        (robot, task, model, quality.duration, str(quality.recordings), *_shares(quality))
         for robot, tasks in found.items()
         for task, models in tasks.items()
         for model, quality in models.items()
     ]
     return (
-        f"predictions of the last {WITHIN_DAYS} days that are labelled\n{table(LABELLED, rows, range(3, 7))}"
+        f"predictions of the last {WITHIN_DAYS} days that are labelled\n{table(LABELLED, rows, range(3, 8))}"
     )
+
+
+def _shares(quality: Quality) -> tuple[str, str, str]:
+    """Return the share of right, wrong and withheld predictions, if enough was labelled to tell."""
+    return quality.shares if quality.is_enough else ("too little", NONE, NONE)
 
 
 def _task(name: str, known: TaskReport) -> tuple[str, ...]:

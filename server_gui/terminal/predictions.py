@@ -79,9 +79,11 @@ def _model(shown: NewestPrediction) -> tuple[str, ...]:
 
 def _right(found: Iterable[NewestPrediction]) -> Iterator[str]:
     """Yield how right models were of late, by labels."""
-    for shown in found:
-        if (quality := shown.predicted.quality) is not None:
-            yield f"{shown.predicted.prediction.task}: {quality.text} in {WITHIN_DAYS} days"
+    told = [(shown.predicted.prediction.task, shown.predicted.quality) for shown in found]
+    lines = [f"{task}: {quality.last_week}" for task, quality in told if quality is not None]
+    if lines:
+        yield f"by labels of the last {WITHIN_DAYS} days:"
+    yield from lines
 
 
 def said(prediction: Prediction) -> str:

@@ -435,4 +435,4 @@ def _tip(shown: Told) -> str:
     predicted = shown.predicted
     learned = f", learned from {predicted.learned_from}" if predicted.learned_from else ""
     told = [f"{model_name(predicted.card)}{learned}, {predicted.card.id}"]
-    return "\n".join(told if predicted.quality is None else [*told, predicted.quality.text])
+    return "\n".join(told if predicted.quality is None else [*told, predicted.quality.last_week])

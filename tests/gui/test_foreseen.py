@@ -111,18 +111,29 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
-    quality = Quality(312, 292, 1, 19, {})
+    quality = Quality(312, 292, 1, 19, {}, seconds=312, recordings=3)
     station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
     line = activity(station)
     assert line.text == "Walk 94 %"
-    assert line.detail == "right 94 % last week (312 checked) · else turn 4 %"
+    assert line.detail == "right 94 % last week (5 min in 3 recordings) · else turn 4 %"
     assert line.short == "right 94 % last week"
-    assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled" in line.tip
-    few = dataclasses.replace(predicted("walk", WALKS), quality=Quality(10, 10, 0, 0, {}))
-    station.take_prediction(few)
+    assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 5 min in 3 recordings" in line.tip
+
+
+@pytest.mark.parametrize(
+    ("seconds", "recordings", "basis"), [(59, 2, "59 s in 2 recordings"), (600, 1, "10 min in 1 recording")]
+)
+def test_where_too_little_was_labelled_that_is_said_and_no_percentage(
+    station: Station, seconds: int, recordings: int, basis: str
+) -> None:
+    quality = Quality(1000, 1000, 0, 0, {}, seconds, recordings)
+    station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
     line = activity(station)
-    assert line.short == "right 10 of 10 last week", "a hundred percent of ten looks known"
-    assert "10 of 10 right, 0 of 10 wrong" in line.tip
+    assert line.text == "Walk", "not checked: as little as without any label"
+    assert line.detail.startswith(f"predicted, too little labelled to tell ({basis})")
+    assert line.short == "predicted, too little labelled to tell"
+    assert f"too little labelled to tell: {basis}, needs 1 min in 2" in line.tip
+    assert "100" not in line.text + line.detail + line.short + line.tip
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
-from server_gui.core.prediction.state import FEW, Quality
+from server_gui.core.prediction.state import TOO_LITTLE, Quality
 from server_gui.core.tuning.stop import ENABLED, is_off
 
 NOT_SEEN: Final = ("lost", "stale")
@@ -25,7 +25,7 @@ SOURCES: Final = {
 class Worth(Enum):
     """What it is worth."""
 
-    CHECKED = "checked"  # people have labelled of late what this model was to say
+    CHECKED = "checked"  # people have labelled enough of late of what this model was to say
     UNCHECKED = "not checked"
     DOUBTFUL = "doubtful"
 
@@ -54,6 +54,8 @@ def belief(told: Told) -> Confidence:
         if predicted.learned_from:
             about = f"learned from {predicted.learned_from}"
         return Confidence(Worth.UNCHECKED, (f"not yet checked on this robot, {about}", "not yet checked"))
+    if not quality.is_enough:
+        return Confidence(Worth.UNCHECKED, (f"{TOO_LITTLE} ({quality.basis})", TOO_LITTLE))
     return Confidence(Worth.CHECKED, _checked(quality))
 
 
@@ -80,10 +82,8 @@ def blind(station: Station) -> str:
 
 
 def _checked(quality: Quality) -> tuple[str, ...]:
-    if quality.labelled < FEW:
-        return (f"right {quality.right} of {quality.labelled} last week",)
     short = f"right {100 * quality.right / quality.labelled:.0f} % last week"
-    return f"{short} ({quality.labelled} checked)", short
+    return f"{short} ({quality.basis})", short
 
 
 def _drifted(told: NewestPrediction) -> str:

@@ -10,7 +10,7 @@ from gateway.units import with_minus
 from ml.registry.card import Card, Metrics
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.names import class_name
-from server_gui.core.prediction.state import WITHIN_DAYS, Quality
+from server_gui.core.prediction.state import TOO_LITTLE, WITHIN_DAYS, Quality
 
 OTHERS: Final = "other sessions"  # the verdict where each was judged by its own
 UNKNOWN: Final = "not labelled"
@@ -105,7 +105,7 @@ def last_week(entry: Entry) -> str:
     if not entry.hits:
         return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
     return "; ".join(
-        f"{robot}: {quality.text}{_but(entry, quality)}" for robot, quality in sorted(entry.hits.items())
+        f"{robot}: {quality.last_week}{_but(entry, quality)}" for robot, quality in sorted(entry.hits.items())
     )
 
 
@@ -116,11 +116,10 @@ def week_short(entry: Entry) -> str:
 
 
 def _week_of(entry: Entry, quality: Quality) -> str:
-    """Return how right it was; where all labels are of one class that proves nothing of the others."""
+    """Return how right it is; where all labels are of one class that proves nothing of the others."""
     if len(quality.confusion) == 1 and len(entry.card.classes) > 1:
         return f"only {class_name(next(iter(quality.confusion)))} labelled"
-    right = quality.shares[0]
-    return right if "of" in right else f"{right} of {quality.labelled}"
+    return f"{quality.shares[0]} of {quality.duration}" if quality.is_enough else TOO_LITTLE
 
 
 def _but(entry: Entry, quality: Quality) -> str:

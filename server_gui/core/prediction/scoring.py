@@ -88,12 +88,17 @@ def counted(was: Names, said: Sequence[str]) -> Counts:
     return Counter((so, label) for so, label in pairs if so != NOBODY)
 
 
-def quality(counts: Mapping[tuple[str, str], int]) -> Quality:
-    """Return the accuracy from such counts."""
+def labelled_seconds(was: Names, stamps_ns: Stamps) -> int:
+    """Return in how many seconds of the robot's clock there are decisions of which the truth is known."""
+    return len(np.unique(stamps_ns[was != NOBODY] // 1_000_000_000))
+
+
+def quality(counts: Mapping[tuple[str, str], int], seconds: int = 0, recordings: int = 0) -> Quality:
+    """Return the accuracy from such counts, made within `seconds` in `recordings`."""
     confusion: dict[str, dict[str, int]] = {}
     for (was, said), count in sorted(counts.items()):
         confusion.setdefault(was, {})[said] = count
     labelled = sum(counts.values())
     right = sum(said.get(was, 0) for was, said in confusion.items())
     unsaid = sum(said.get(UNKNOWN, 0) + said.get(ABNORMAL, 0) for said in confusion.values())
-    return Quality(labelled, right, labelled - right - unsaid, unsaid, confusion)
+    return Quality(labelled, right, labelled - right - unsaid, unsaid, confusion, seconds, recordings)

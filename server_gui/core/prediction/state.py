@@ -5,18 +5,53 @@ from typing import Final
 
 from msgspec import Struct
 
+from gateway.amounts import counted
+
 WITHIN_DAYS: Final = 7  # of predictions that are compared with labels
 FEW: Final = 30  # decisions, of which a percentage would look as if it were known
+# Decisions follow each other so closely that thousands of one walk say hardly more than one of them, so that
+# an interval over their number (Wilson's) would be much too narrow. What counts is time, and another day.
+LEAST_S: Final = 60
+LEAST_RECORDINGS: Final = 2
+TOO_LITTLE: Final = "too little labelled to tell"
 
 
 class Quality(Struct, frozen=True):
-    """Accuracy by labels: of `labelled` decisions, the right, the wrong, and the abstentions."""
+    """Accuracy by labels: of `labelled` decisions, the right, the wrong, and the abstentions.
+
+    They were made within `seconds` in `recordings`; 0 where it is not known in how many.
+    """
 
     labelled: int
     right: int
     wrong: int
     unsaid: int  # unknown or abnormal
     confusion: dict[str, dict[str, int]]  # what it was → what was said → decisions
+    seconds: int = 0
+    recordings: int = 0
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether it rests on enough to say how right a model is, not only how right it was there."""
+        return self.seconds >= LEAST_S and self.recordings >= LEAST_RECORDINGS
+
+    @property
+    def basis(self) -> str:
+        """How much it rests on, in words."""
+        return f"{self.duration} in {counted(self.recordings, 'recording')}"
+
+    @property
+    def duration(self) -> str:
+        """How long was labelled, in words."""
+        return f"{self.seconds} s" if self.seconds < LEAST_S else f"{self.seconds // 60} min"
+
+    @property
+    def last_week(self) -> str:
+        """How right a model is, in words and by what; that too little was labelled where that is so."""
+        if not self.is_enough:
+            return f"{TOO_LITTLE}: {self.basis}, needs {LEAST_S // 60} min in {LEAST_RECORDINGS}"
+        right, wrong, unsaid = self.shares
+        return f"{right} right, {wrong} wrong, {unsaid} not said of {self.basis}"
 
     @property
     def shares(self) -> tuple[str, str, str]:

@@ -1,7 +1,6 @@
 """Accuracy of the last days' predictions, by labels in the store."""
 
 import itertools
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from datetime import UTC, datetime, timedelta
 from typing import Final, NamedTuple
@@ -20,7 +19,15 @@ from ml.store.labels import ACTIVITIES, INSTANTS, Label, holding
 from ml.store.tables import LABELS, PREDICTIONS, Table
 from ml.store.translation import translated
 from ml.training.recorded import Recorded
-from server_gui.core.prediction.scoring import Counts, Decisions, compared, counted, proven_classes, quality
+from server_gui.core.prediction.scoring import (
+    Counts,
+    Decisions,
+    compared,
+    counted,
+    labelled_seconds,
+    proven_classes,
+    quality,
+)
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures
 
 Key = tuple[str, str, str]  # robot, task, model
@@ -39,6 +46,13 @@ class Stretch(NamedTuple):
     files: tuple[str, ...]
 
 
+class Compared(NamedTuple):
+    """Decisions of a recording of which the truth is known, and in how many seconds they are."""
+
+    counts: Counts
+    seconds: int
+
+
 class TrackRecord:
     """Track record in one store; for one thread at a time. It rereads only changed data."""
 
@@ -48,7 +62,7 @@ class TrackRecord:
         self._seen: object = None  # what `_figures` are of
         self._figures: Figures = {}
         self._labelled: tuple[object, list[Label]] = None, []  # of what, session by session
-        self._counts: Mapping[Stretch, Mapping[Key, Counts]] = {}
+        self._counts: Mapping[Stretch, Mapping[Key, Compared]] = {}
 
     def figures(self, robots: Set[str], now: datetime, ending: Callable[[], bool] = lambda: False) -> Figures:
         """Return the predictions about these robots of the last days; nothing new while it is `ending`.
@@ -63,7 +77,7 @@ class TrackRecord:
         labels, said = self._version(LABELS), self._version(PREDICTIONS)
         if (robots, since, labels, said) == self._seen:
             return self._figures
-        counts: dict[Stretch, Mapping[Key, Counts]] = {}
+        counts: dict[Stretch, Mapping[Key, Compared]] = {}
         if labels is not None and said is not None:
             for stretch in self._stretches(robots, since, labels, said):
                 if ending():
@@ -106,7 +120,7 @@ class TrackRecord:
             rows = self._store.dataset(LABELS.name, version).to_table(filter=wanted).to_pylist()
         return sorted((Label.of(row) for row in holding(rows)), key=_session)
 
-    def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Counts]:
+    def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Compared]:
         """Count predictions in a stretch against its labels, by robot, task and model."""
         robot, session = _session(stretch.labels[0])
         rows = self._said(stretch, version)
@@ -120,8 +134,9 @@ class TrackRecord:
             task, model = one["task"], one["model"]
             if classes := proven_classes(self._registry, model, session):
                 said = _decisions(rows.filter((_field("task") == task) & (_field("model") == model)))
-                both = compared(stretch.labels, clock, TASKS[task], classes, said)
-                found[robot, task, model] = counted(*both)
+                was, said_then = compared(stretch.labels, clock, TASKS[task], classes, said)
+                seconds = labelled_seconds(was, said.stamps_ns)
+                found[robot, task, model] = Compared(counted(was, said_then), seconds)
         return found
 
     def _said(self, stretch: Stretch, version: int) -> pa.Table:
@@ -157,13 +172,15 @@ def _between(files: Sequence[DataFile], begin: datetime, end: datetime) -> Itera
             yield file.path
 
 
-def _figures(found: Iterable[Mapping[Key, Counts]]) -> Figures:
-    totals: dict[Key, Counts] = {}
-    for counts in found:
-        for key, count in counts.items():
-            totals[key] = totals.get(key, Counter()) + count
+def _figures(found: Iterable[Mapping[Key, Compared]]) -> Figures:
+    by_key: dict[Key, list[Compared]] = {}
+    for recording in found:
+        for key, one in recording.items():
+            if one.counts:
+                by_key.setdefault(key, []).append(one)
     figures: Figures = {}
-    for (robot, task, model), total in sorted(totals.items()):
-        if total:
-            figures.setdefault(robot, {}).setdefault(task, {})[model] = quality(total)
+    for (robot, task, model), each in sorted(by_key.items()):
+        counts = sum((one.counts for one in each), Counts())
+        seconds = sum(one.seconds for one in each)
+        figures.setdefault(robot, {}).setdefault(task, {})[model] = quality(counts, seconds, len(each))
     return figures

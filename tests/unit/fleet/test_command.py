@@ -15,12 +15,13 @@ from gateway.client import Address
 from server_gui.cli.collect import status_text
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkStatistics
-from server_gui.core.prediction.state import DangerReport, PredictingState
+from server_gui.core.prediction.state import DangerReport, PredictingState, Quality
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import Upload
 from server_gui.processes.shutdown_signals import ShutdownRequested
 
+ENOUGH, ONE_WALK = (Quality(312, 292, 1, 19, {}, seconds=312, recordings=count) for count in (3, 1))
 HEAVY = ("PySide6", "pyqtgraph", "sklearn", "duckdb")
 
 
@@ -91,9 +92,15 @@ def test_a_status_says_what_people_ask_first() -> None:
         robots={"exo-01": LinkStatistics(Address("192.0.2.7")).report("")},
         recorder=RecorderState(12, 3, 4, 0.01, (alarm,)),
         uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network", ("/spool/00000003.damaged.db",)),
-        prediction=PredictingState(dangers={"exo-01": DangerReport("none, 0.04", time.time() - 3600.0)}),
+        prediction=PredictingState(
+            dangers={"exo-01": DangerReport("none, 0.04", time.time() - 3600.0)},
+            labelled={"exo-01": {"activity": {"enough": ENOUGH, "little": ONE_WALK}}},
+        ),
     )
     text = status_text(report)
+    rows = {line.split()[2]: line.split()[3:] for line in text.splitlines() if " activity " in line}
+    assert rows["enough"] == ["5", "min", "3", "93.6", "%", "0.3", "%", "6.1", "%"]
+    assert rows["little"] == ["5", "min", "1", "too", "little", "–", "–"], "of one walk"
     for words in (
         "12 rows",
         "4 lost",

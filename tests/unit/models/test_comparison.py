@@ -92,21 +92,21 @@ def test_last_week_is_not_known_where_nobody_has_labelled_it() -> None:
     unknown = entry()
     assert last_week(unknown) == "not known: nothing that it said within 7 days was labelled"
     assert week_short(unknown) == "not labelled"
-    quality = Quality(200, 192, 6, 2, {})
+    quality = Quality(200, 192, 6, 2, {}, seconds=200, recordings=2)
     known = Entry(card(), "a", False, (), "", {"exo-01": quality})
-    assert last_week(known) == "exo-01: 96.0 % right, 3.0 % wrong, 1.0 % not said of 200 labelled"
-    assert week_short(known) == "96.0 % of 200"
+    assert last_week(known) == "exo-01: 96.0 % right, 3.0 % wrong, 1.0 % not said of 3 min in 2 recordings"
+    assert week_short(known) == "96.0 % of 3 min"
 
 
 def test_labels_of_one_class_alone_prove_nothing_of_the_others() -> None:
     """A detector of falls was 100 % right in a week without a fall."""
-    steady = Quality(200, 200, 0, 0, {"steady": {"steady": 200}})
+    steady = Quality(200, 200, 0, 0, {"steady": {"steady": 200}}, seconds=200, recordings=2)
     one = Entry(card(classes=("steady", "near_fall", "fall")), "a", False, (), "", {"exo-01": steady})
     assert week_short(one) == "only steady labelled"
-    assert last_week(one).endswith("of 200 labelled; none of it labelled near fall, fall")
+    assert last_week(one).endswith("in 2 recordings; none of it labelled near fall, fall")
     both = Quality(4, 4, 0, 0, {"steady": {"steady": 2}, "fall": {"fall": 2}})
     two = dataclasses.replace(one, hits={"exo-01": steady, "exo-02": both})
-    assert week_short(two) == "exo-01 only steady labelled, exo-02 4 of 4"
+    assert week_short(two) == "exo-01 only steady labelled, exo-02 too little labelled to tell"
 
 
 def test_the_worst_of_one_wearer_is_no_figure_of_its_own() -> None:

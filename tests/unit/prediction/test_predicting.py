@@ -267,7 +267,7 @@ def test_what_labels_say_of_the_model_is_told_with_its_predictions(folder_url: s
             lambda: told.predicted() and told.predicted()[-1].quality, lambda: one.take(ROBOT, next(sent))
         )
         state = one.state
-    quality = Quality(3, 2, 0, 1, {"walk": {"unknown": 1, "walk": 2}})
+    quality = Quality(3, 2, 0, 1, {"walk": {"unknown": 1, "walk": 2}}, seconds=1, recordings=1)
     assert told.predicted()[-1].quality == quality
     assert state.labelled == {ROBOT: {"activity": {lab.model: quality}}}
     assert not state.problems

@@ -16,7 +16,7 @@ from tests.unit.prediction.robots import ROBOT, card
 
 LABELS = {"falling": "near_fall", "gait_phase": "stride", "activity": "stand_to_sit"}
 PHASES = {"left": 0.43, "right": 0.91}
-QUALITY = Quality(123_456, 123_000, 0, 456, {})
+QUALITY = Quality(123_456, 123_000, 0, 456, {}, seconds=2_469, recordings=12)
 
 
 def watched(label_of_phase: str = "stride") -> Watched:
@@ -39,7 +39,10 @@ def test_it_fits_a_terminal_of_80_columns_and_tasks_stay_in_order() -> None:
         "falling",
     ]
     assert "falling-0123456789ab     today  simulated" in lines
-    assert "activity: 99.6 % right, 0.0 % wrong, 0.4 % not said of 123456 labelled in 7 days" in lines
+    assert lines[lines.index("by labels of the last 7 days:") + 1 :] == [
+        f"{task}: 99.6 % right, 0.0 % wrong, 0.4 % not said of 41 min in 12 recordings"
+        for task in ("activity", "falling")
+    ]
     assert any("stride left 0.43 right 0.91" in line for line in lines)
 
 

@@ -38,7 +38,7 @@ def test_what_is_labelled_is_right_wrong_or_not_said(lab: Lab) -> None:
     lab.say(["walk"] * 8 + ["stand"] + ["unknown"] * 2 + ["abnormal"] + ["stand"] * 10)
     lab.label("walk", -DELAY_MS, 1_200 - DELAY_MS)  # what the first twelve are about
     assert figures(lab) == {
-        lab.model: Quality(12, 8, 1, 3, {"walk": {"abnormal": 1, "stand": 1, "unknown": 2, "walk": 8}})
+        lab.model: Quality(12, 8, 1, 3, {"walk": {"abnormal": 1, "stand": 1, "unknown": 2, "walk": 8}}, 2, 1)
     }
 
 
@@ -61,9 +61,11 @@ def test_models_and_sessions_are_counted_by_themselves(lab: Lab) -> None:
         lab.label("walk", -DELAY_MS, 500, session=session)
     lab.say(["steady"] * 5, task="falling")
     found = figures(lab)
-    assert {model: (one.labelled, one.right) for model, one in found.items()} == {
-        lab.model: (10, 10),
-        other: (5, 5),  # it has learned from the other session
+    assert {
+        model: (one.labelled, one.right, one.seconds, one.recordings) for model, one in found.items()
+    } == {
+        lab.model: (10, 10, 2, 2),
+        other: (5, 5, 1, 1),  # it has learned from the other session
     }
 
 
@@ -137,4 +139,4 @@ def test_a_phase_is_right_within_a_tenth_of_the_cycle_of_both_legs(lab: Lab) -> 
     say("stride", 6_000, 3, ahead=0.0)  # nobody knows
     found = TrackRecord(lab.url).figures({ROBOT}, NOW)[ROBOT]["gait_phase"]
     confusion = {"no stride": {"stride": 1}, "stride": {"another phase": 3, "stride": 4, "unknown": 2}}
-    assert found == {model: Quality(10, 4, 4, 2, confusion)}
+    assert found == {model: Quality(10, 4, 4, 2, confusion, 4, 1)}
