@@ -15,7 +15,7 @@ from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
-from server_gui.views.recordings.timeline import clock_text
+from server_gui.views.recordings.timeline import clock_text, day_text
 from server_gui.views.widgets.cursors import FIRST, FLAGS
 from tests.gui.archives import ADA, Shown, play, record
 from tests.gui.fakes import Bench
@@ -187,12 +187,32 @@ def test_clock_and_alarm_are_of_the_instant_that_a_jump_leads_to(
     playback, tape = archive.playback, archive.playback.tape
     assert tape is not None
     for seconds, told in ((FAULT_S - 3.0, False), (FAULT_S + 1.0, True)):
-        player._frame = 1  # the next look at what people read is some frames away
+        player._pace.is_due(None)  # the next look at what people read is some frames away
         playback.seek(tape.first_ns + round(seconds * 1e9))
         player.refresh()
         assert not playback.is_loading
         assert player.place.text().startswith(clock_text(seconds, 1))
         assert bool(player.alarms.told) is told
+
+
+def test_while_it_plays_the_clock_is_of_the_playhead_in_every_frame(
+    shown: Shown, archive: Archive, player: Player, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy computer a frame takes as long as many, and words were those of five frames before."""
+    playback, tape = archive.playback, archive.playback.tape
+    assert tape is not None
+    now_s = 100.0
+    monkeypatch.setattr("server_gui.core.archive.playback.time.monotonic", lambda: now_s)
+    playback.play(on=True)
+    player.refresh()
+    for _ in range(8):
+        now_s += 0.3
+        player.refresh()
+        since_s = (playback.position_ns - tape.first_ns) / 1e9
+        assert player.timeline._position_ns == playback.position_ns
+        assert player.place.text().startswith(f"{clock_text(since_s, 1)} of ")
+        assert day_text(playback.position_ns) in player.banner.text()
+    assert playback.position_ns > tape.first_ns + 2 * 10**9, "it has played"
 
 
 def test_a_recording_that_stands_still_is_said_to_be_paused_alone(

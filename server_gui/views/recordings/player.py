@@ -39,6 +39,7 @@ from server_gui.views.predictions import STOPPED, UNSEEN, status
 from server_gui.views.recordings.beside_bar import BesideBar
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
+from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.cursors import FLAGS
@@ -66,7 +67,6 @@ NOT_REPLAYED_HINT: Final = (
 READING: Final = "reading both recordings …"
 NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SETTLES: Final = 8  # frames until all plots are there
-SLOW: Final = 5  # frames between two looks at what people read
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)
 
@@ -83,8 +83,7 @@ class Player(QWidget):
         self._archive = archive
         self._playback = archive.playback
         self._theme = theme
-        self._frame = 0
-        self._worded = 0, False  # the instant of which the words are, and whether it was being read
+        self._pace = RefreshRate()
         self._told: dict[Playback, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked, until a drive fails
@@ -208,10 +207,9 @@ class Player(QWidget):
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)
         self.timeline.show_outline(playback.outline)
-        self._frame += 1
-        jumped = not playback.playing and (playback.position_ns, playback.is_loading) != self._worded
-        if self._frame % SLOW == 1 or jumped:
-            self._worded = playback.position_ns, playback.is_loading
+        self._refresh_clock(playback.tape)
+        shown = playback.playing or (playback.position_ns, playback.is_loading)
+        if self._pace.is_due((playback.tape, shown)):
             self._refresh_words()
 
     def _refresh_beside(self) -> None:
@@ -327,21 +325,24 @@ class Player(QWidget):
 
     # --- what is read
 
+    def _refresh_clock(self, tape: Tape) -> None:
+        """Say the instant that is drawn, with every frame: on a busy computer the next look may be late."""
+        playback, happened = self._playback, self._playback.happened
+        set_text(self.banner, self._title())
+        since, length = ((at - tape.first_ns) / SECOND_NS for at in (playback.position_ns, tape.last_ns))
+        known = f" · events not known: {happened.problem}" if happened.problem else ""
+        looking = " · looking for events …" if happened.is_looking else known
+        set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
+
     def _refresh_words(self) -> None:
         playback, tape = self._playback, self._playback.tape
         if tape is None:
             return
         self._tone("bad" if playback.problem else "")
-        set_text(self.banner, self._title())
         set_tip(self.banner, self.banner.text())
         text = "Pause" if playback.playing else "Play"
         if self.play.text() != text:
             self.play.setText(text)
-        since, length = ((at - tape.first_ns) / SECOND_NS for at in (playback.position_ns, tape.last_ns))
-        happened = playback.happened
-        known = f" · events not known: {happened.problem}" if happened.problem else ""
-        looking = " · looking for events …" if happened.is_looking else known
-        set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
         self._refresh_flags()
         has_events = bool(self._in_order)  # as the time axis shows them
         self.events.setEnabled(has_events)
