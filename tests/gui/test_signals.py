@@ -88,6 +88,21 @@ def test_too_many_curves_are_named_not_dropped_silently(signals: Signals) -> Non
     assert f"{len(names) - MOST_CURVES} more are not drawn" in signals.said.text()
 
 
+def test_where_frames_are_slow_each_says_the_values_that_it_draws(
+    signals: Signals, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy computer every fifth frame is a second later."""
+    signals.choose(["left_hip.torque"])
+    now_ns, newest = 1_000_000_000, bench.station.rings.newest_ns
+    assert newest is not None
+    monkeypatch.setattr("server_gui.views.workspace.page.now_ns", lambda: now_ns)
+    for frame in range(1, 7):
+        now_ns += 300_000_000
+        bench.station.take([telemetry([newest + frame * 10_000_000], {"left_hip.torque": [10.0 * frame]})])
+        signals.refresh()
+        assert f"{10 * frame}.0" in signals.plots[0]._legend.accessibleDescription()
+
+
 def test_a_paused_view_stands_still_while_data_go_on(signals: Signals, bench: Bench, tmp_path: Path) -> None:
     signals.choose(["left_hip.position"])
     signals.pause.setChecked(True)

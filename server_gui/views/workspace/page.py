@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest, row_at
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.settings.server_file import default_file
 from server_gui.core.workspace.exporting import save_csv
 from server_gui.core.workspace.layouts import Layout, Layouts
@@ -21,6 +22,7 @@ from server_gui.core.workspace.scene import Scene, layout_of
 from server_gui.core.workspace.trigger import Condition
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.marks import old_text
+from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
@@ -75,6 +77,7 @@ class Signals(QWidget):
         self.area.fitted.connect(self._follow)
         self.area.hovered.connect(self._hovered)
         self._begun, self._frame = False, 0
+        self._read_ns = 0  # when people's words were last looked at
         self._jumped_ns: int | None = None  # on the robot's clock
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
@@ -143,7 +146,8 @@ class Signals(QWidget):
         self.scene.look_for_trigger(self._seconds)
         draw(self.scene, self.cards, station, self._seconds, self._window)
         self._frame += 1
-        if self._frame % SLOW == 1:
+        if self._frame % SLOW == 1 or now_ns() - self._read_ns >= READ_NS:
+            self._read_ns = now_ns()
             set_text(self.said, self._state(station) + self._told)
             set_tip(self.said, self.said.text())
             self._say_more()
