@@ -16,6 +16,10 @@ class RefreshRate:
         self._read_ns = 0
         self._about: object = None
 
+    def hurry(self) -> None:
+        """Let it be due with the next frame."""
+        self._read_ns = 0
+
     def is_due(self, about: object) -> bool:
         """Return whether it is time; `about` is what it would be about."""
         self._frame += 1

@@ -55,7 +55,7 @@ def cell(view: Measuring, row: int, title: str) -> str:
 
 
 def title(signals: Signals) -> str:
-    signals._frame = 0
+    signals.read_now()
     signals.refresh()
     return " ".join(signals.measuring.times.text().split())
 

@@ -82,7 +82,7 @@ def test_too_many_curves_are_named_not_dropped_silently(signals: Signals) -> Non
         for quantity in ("position", "velocity", "torque", "current", "temperature")
     ]
     signals.choose(names)
-    signals._frame = 0
+    signals.read_now()
     signals.refresh()
     assert sum(len(plot.channels) for plot in signals.plots) == MOST_CURVES
     assert f"{len(names) - MOST_CURVES} more are not drawn" in signals.said.text()
@@ -95,7 +95,7 @@ def test_where_frames_are_slow_each_says_the_values_that_it_draws(
     signals.choose(["left_hip.torque"])
     now_ns, newest = 1_000_000_000, bench.station.rings.newest_ns
     assert newest is not None
-    monkeypatch.setattr("server_gui.views.workspace.page.now_ns", lambda: now_ns)
+    monkeypatch.setattr("server_gui.views.refresh_rate.now_ns", lambda: now_ns)
     for frame in range(1, 7):
         now_ns += 300_000_000
         bench.station.take([telemetry([newest + frame * 10_000_000], {"left_hip.torque": [10.0 * frame]})])

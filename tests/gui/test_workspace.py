@@ -72,7 +72,7 @@ def drop(on: QWidget, texts: list[str], at: QPoint | None = None) -> bool:
 
 
 def said(signals: Signals) -> str:
-    signals._frame = 0
+    signals.read_now()
     signals.refresh()
     return f"{signals.said.text()}{signals.refused.text()}"
 

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest, row_at
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.settings.server_file import default_file
 from server_gui.core.workspace.exporting import save_csv
 from server_gui.core.workspace.layouts import Layout, Layouts
@@ -22,7 +21,7 @@ from server_gui.core.workspace.scene import Scene, layout_of
 from server_gui.core.workspace.trigger import Condition
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.marks import old_text
-from server_gui.views.refresh_rate import READ_NS
+from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
@@ -48,7 +47,6 @@ LIST, LOW, MARGIN = 150, 90, 8  # the channels at least: wide, high; beside ever
 NARROW: Final = 380  # wide: with less the plots stand below the channels
 GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
-SLOW: Final = 5  # frames between two looks at what people read
 
 
 class Signals(QWidget):
@@ -76,8 +74,7 @@ class Signals(QWidget):
         self.area.moved.connect(self._move)
         self.area.fitted.connect(self._follow)
         self.area.hovered.connect(self._hovered)
-        self._begun, self._frame = False, 0
-        self._read_ns = 0  # when people's words were last looked at
+        self._begun, self._pace = False, RefreshRate()
         self._jumped_ns: int | None = None  # on the robot's clock
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
@@ -114,7 +111,7 @@ class Signals(QWidget):
 
     def read_now(self) -> None:
         """Let the next frame say also what is read: what stands beside it is said anew then."""
-        self._frame = 0
+        self._pace.hurry()
 
     def show_tools(self, on: bool) -> None:
         """Show what arranges plots, above and beside them; without, plots have its room."""
@@ -145,9 +142,7 @@ class Signals(QWidget):
         self._look(station)
         self.scene.look_for_trigger(self._seconds)
         draw(self.scene, self.cards, station, self._seconds, self._window)
-        self._frame += 1
-        if self._frame % SLOW == 1 or now_ns() - self._read_ns >= READ_NS:
-            self._read_ns = now_ns()
+        if self._pace.is_due(station):
             set_text(self.said, self._state(station) + self._told)
             set_tip(self.said, self.said.text())
             self._say_more()
@@ -175,7 +170,8 @@ class Signals(QWidget):
         self.pause.setChecked(False)  # else it would be what was seen before
         if not self.show_at(at_ns):
             self.pause.setChecked(False)  # nothing else is shown in its place as if it were that
-            self._is_gone, self._frame = True, 0
+            self._is_gone = True
+            self.read_now()
 
     def save_csv(self, path: Path) -> None:
         """Save what is on screen, in SI units, a row a time."""
@@ -205,7 +201,8 @@ class Signals(QWidget):
 
     def tell(self, text: str) -> None:
         """Say what came of something."""
-        self._told, self._frame = self.refused.take(text), 0
+        self._told = self.refused.take(text)
+        self.read_now()
 
     # --- how it is put together
 
@@ -251,7 +248,7 @@ class Signals(QWidget):
         self._mark()
         self.scene.keep_more()
         self.trigger.show_choices(self.scene)
-        self._frame = 0
+        self.read_now()
 
     def _restyle(self) -> None:
         self.channels.setIndentation(self._theme.px(10))
@@ -367,7 +364,7 @@ class Signals(QWidget):
             return
         self.pause.setChecked(False)
         self.scene.arm(condition)
-        self._frame = 0
+        self.read_now()
 
     def _look_beside(self) -> None:
         beside = self.scene.beside
@@ -402,7 +399,7 @@ class Signals(QWidget):
         self.span.setCurrentIndex(wanted % len(SPANS_S))
         self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
         self._jumped_ns = stamp_ns
-        self._frame = 0
+        self.read_now()
         return True
 
     def _turn(self, way: int) -> None:
@@ -440,12 +437,12 @@ class Signals(QWidget):
             self.measuring.setFocus()
             bring_into_sight(self.measuring)
         self._mark()
-        self._frame = 0  # measure at once
+        self.read_now()  # measure at once
 
     def _move(self, cursor: int, to_s: float) -> None:
         self._active, self._at[cursor] = cursor, to_s
         self._mark()
-        self._frame = 0
+        self.read_now()
 
     def _step(self, samples: int) -> None:
         """Move the active cursor by so many samples."""
@@ -472,8 +469,7 @@ class Signals(QWidget):
             for text in plot.drawn
             for name, values in columns(self.scene, text, self.scene.times(self._seconds))
         ]
-        a_s, b_s = self._at
-        a_s, b_s = (a_s if a is None else float(times[a])), (b_s if b is None else float(times[b]))
+        a_s, b_s = (s if at is None else float(times[at]) for s, at in zip(self._at, (a, b), strict=True))
         self.measuring.show_readings(a_s, b_s, self._active, rows)
 
     def _times(self) -> Floats:
