@@ -9,7 +9,8 @@ from gateway.client import NotConnected
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.overview.joint_table import ERROR, STATE, STOP, JointModel
+from server_gui.views.overview.joint_cells import ERROR, STATE, STOP
+from server_gui.views.overview.joint_table import JointModel
 from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW

@@ -26,7 +26,8 @@ from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.marks import Mark
-from server_gui.views.overview.joint_table import ANGLE, ERROR, STATE, STOP, TORQUE, JointModel, JointTable
+from server_gui.views.overview.joint_cells import ANGLE, ERROR, STATE, STOP, TORQUE
+from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import PredictionRow
 from server_gui.views.theme import Theme

@@ -5,17 +5,8 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication
 
 from gateway.wire.parameter import ParameterValue
-from server_gui.views.overview.joint_table import (
-    CURRENT,
-    ERROR,
-    STATE,
-    TEMPERATURE,
-    TORQUE,
-    VELOCITY,
-    JointModel,
-    JointTable,
-    in_few_words,
-)
+from server_gui.views.overview.joint_cells import CURRENT, ERROR, STATE, TEMPERATURE, TORQUE, VELOCITY
+from server_gui.views.overview.joint_table import JointModel, JointTable, in_few_words
 from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card

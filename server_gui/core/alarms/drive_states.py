@@ -5,8 +5,10 @@ from typing import Any, Final
 
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.follow.robot import Robot
+from server_gui.core.tuning.stop import is_off
 
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
+STATES_S: Final = 5.0  # of an older row nobody says which drives are off; late rows correct it
 
 
 def moving_joints(robot: Robot) -> list[str]:
@@ -17,6 +19,14 @@ def moving_joints(robot: Robot) -> list[str]:
         for joint in robot.names("joint")
         if words[joint] == ENABLED or abs(robot.values.get(f"{joint}.velocity") or 0.0) > MOVES
     ]
+
+
+def off_of_late(robot: Robot) -> set[str]:
+    """Return the joints whose drive was off in the newest row, where that is not old."""
+    age_s = robot.age_s()
+    if not robot.is_linked or age_s is None or age_s > STATES_S:
+        return set()
+    return {joint for joint, word in state_words(robot).items() if is_off(word)}
 
 
 def drives_did(robot: Robot) -> str:

@@ -20,6 +20,7 @@ from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import Stalls, gathered
+from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.robot_alarms import Facts, any_enabled, go_on
 from server_gui.core.alarms.robot_alarms import alarms as found
@@ -60,12 +61,11 @@ from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.reverted_trials import OVERDUE_S, RevertedTrials
-from server_gui.core.tuning.stop import Sent, StopProgress, StopState, is_off
+from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
-STATES_S: Final = 5.0  # of an older row nobody says which drives were off before a STOP; late rows correct it
 
 
 class Station:
@@ -313,11 +313,7 @@ class Station:
     def send_stop(self, reason: str) -> Sent:
         """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
         at_ns, future = time.monotonic_ns(), self._commands.stop(reason)
-        age_s = self.robot.age_s()
-        is_known = self.is_linked and age_s is not None and age_s <= STATES_S
-        joints = self.robot.names("joint") if is_known else ()
-        off = {joint for joint in joints if is_off(self.robot.word(f"{joint}.state"))}
-        return Sent(at_ns, future, off)
+        return Sent(at_ns, future, off_of_late(self.robot))
 
     def note_stop(self, sent: Sent) -> None:
         """Follow what becomes of a STOP that was sent."""

@@ -1,8 +1,6 @@
 """The joint table: what each drive tells, in the units of choice, with bars where there is a limit."""
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
@@ -14,53 +12,34 @@ from PySide6.QtWidgets import (
     QTableView,
 )
 
-from gateway.units import Unit, rounded
-from server_gui.core.alarms.marks import GLYPHS
-from server_gui.core.alarms.severity import colour_of
-from server_gui.core.alarms.texts import error_text
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.station import Station
-from server_gui.core.follow.robot import FollowedComponent
-from server_gui.core.tuning.stop import StopState
-from server_gui.views.marks import STILL_ENABLED, state_mark
+from server_gui.views.overview.joint_cells import (
+    ANGLE,
+    COLUMNS,
+    CURRENT,
+    ENABLED_AGAIN,
+    ERROR,
+    JOINT,
+    NONE,
+    NOT_KNOWN,
+    SI,
+    STATE,
+    STOP,
+    TEMPERATURE,
+    TORQUE,
+    VELOCITY,
+    Bar,
+    Cell,
+    at_fault,
+    row_of,
+    unit_of,
+)
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
-# column → quantity; the SI unit of each
-COLUMNS: Final = (
-    ("Joint", ""),
-    ("State", ""),
-    ("Angle / target", "position"),
-    ("Velocity", "velocity"),
-    ("Torque", "torque"),
-    ("Current", "current"),
-    ("Temp.", "temperature"),
-    ("Error", "error_code"),
-    ("Confirmed after", ""),
-)
-JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
-SI: Final = {
-    "position": "rad",
-    "velocity": "rad/s",
-    "torque": "N·m",
-    "current": "A",
-    "temperature": "°C",
-}
-SIGNED: Final = frozenset({"position", "velocity", "torque", "current"})
 SPARE: Final = (CURRENT, VELOCITY, TEMPERATURE, STOP)  # left out in this order where there is less room
-ENABLED_AGAIN: Final = "enabled again"  # after which the latest STOP is no news
-# How error codes of CiA 402 begin (IEC 61800-7-201) → the column that holds what they are about.
-ABOUT: Final = {0x2000: CURRENT, 0x4000: TEMPERATURE, 0x8400: VELOCITY}
-FAMILIES: Final = (0xF000, 0xFF00)  # of a code: how much of it says what it is about
-FAR_RAD: Final = 0.175  # 10°: the end of the bar of how far a joint is from its target
-NEAR_LIMIT: Final = 0.8  # of a limit
-CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
-ENABLED: Final = "operation enabled"  # only then it is to be where its target is
-NONE: Final = "–"
-NOT_KNOWN: Final = "not known"
-IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 BELOW, ABOVE = "↓", "↑"  # where its words stand
 HINT: Final = (
     "Time from the latest STOP until this window knew that the drive was off, by its state or its "
@@ -84,24 +63,6 @@ BAR_SHARE: Final = 0.21  # of a row's height
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """From the middle to one side, −1 to 1; `colour` is a name of the palette."""
-
-    share: float
-    colour: str
-
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """What stands in a cell, in which colour of the palette, and below it a bar."""
-
-    text: str
-    colour: str = "text"
-    bar: Bar | None = None
-    tip: str = ""
-
-
 class JointModel(QAbstractTableModel):
     """Texts of the robot that is looked at; only the rows that have changed are drawn again."""
 
@@ -117,8 +78,8 @@ class JointModel(QAbstractTableModel):
         """Show how it is now."""
         station = self._desk.selected
         joints = [] if station is None else station.robot.names("joint")
-        rows = [] if station is None else [_row(station, joint, self._desk) for joint in joints]
-        self.at_fault = frozenset() if station is None else _at_fault(station, joints)
+        rows = [] if station is None else [row_of(station, joint, self._desk) for joint in joints]
+        self.at_fault = frozenset() if station is None else at_fault(station, joints)
         if joints != self._joints or not self._cells:
             self.beginResetModel()
             self._joints, self._cells = joints, rows
@@ -168,7 +129,7 @@ class JointModel(QAbstractTableModel):
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             title, quantity = COLUMNS[section]
-            return f"{title} {_unit(self._desk, quantity).symbol}" if quantity in SI else title
+            return f"{title} {unit_of(self._desk, quantity).symbol}" if quantity in SI else title
         if section == STOP and role == Qt.ItemDataRole.ToolTipRole:
             return HINT
         if role == Qt.ItemDataRole.TextAlignmentRole and ANGLE <= section <= TEMPERATURE:
@@ -393,129 +354,3 @@ class JointTable(QTableView):
 def in_few_words(state: str) -> str:
     """Return a state as it is said where there is little room."""
     return next((state.replace(full, few) for full, few in FEW_WORDS.items() if full in state), state)
-
-
-def _unit(desk: Desk, quantity: str) -> Unit:
-    return desk.shown.units.unit(quantity, SI[quantity])
-
-
-def _row(station: Station, joint: str, desk: Desk) -> list[Cell]:
-    robot = station.robot
-    part = robot.parts[joint]
-    gone = part.state in ("stale", "lost")
-    stale = gone or not station.is_live
-    word = part.state if gone else robot.word(f"{joint}.state")
-    unproven = word == ENABLED and station.stopping.is_unproven
-    mark = STILL_ENABLED if unproven else state_mark(word)
-    colour = colour_of(joint, station.alarms, mark.colour) if gone else mark.colour
-    age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
-    side = joint.partition("_")[0]
-    state = f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}"
-    return [
-        Cell(joint.replace("_", " "), side if side in ("left", "right") else "text"),
-        Cell(state, "old" if not station.is_live else colour),
-        _angle(station, joint, desk, stale=stale),
-        *(_value(station, joint, "velocity", desk, stale=stale),),
-        _torque(station, joint, desk, stale=stale),
-        *(_value(station, joint, quantity, desk, stale=stale) for quantity in ("current", "temperature")),
-        _error(station, part, stale=stale),
-        _stop(station, joint),
-    ]
-
-
-def _value(station: Station, joint: str, quantity: str, desk: Desk, *, stale: bool) -> Cell:
-    value = station.robot.values.get(f"{joint}.{quantity}")
-    return Cell(_text(_unit(desk, quantity), quantity, value), "old" if stale or value is None else "text")
-
-
-def _text(unit: Unit, quantity: str, value: float | None) -> str:
-    if value is None:
-        return "–"
-    return rounded(value * unit.scale, unit.digits, "+" if quantity in SIGNED else "")
-
-
-def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
-    """Return where it is, where it should be, and how far that is apart."""
-    unit = _unit(desk, "position")
-    position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
-    text = f"{_text(unit, 'position', position)} / {_text(unit, 'position', target)}"
-    if position is None or target is None:
-        return Cell(text, "old" if stale or position is None else "text")
-    off = position - target
-    follows = not stale and station.robot.word(f"{joint}.state") == ENABLED
-    bar = None if not follows else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
-    return Cell(
-        text, "old" if stale else "text", bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"
-    )
-
-
-def _target(station: Station, joint: str) -> float | None:
-    """Return the target; if the drive tells none, its position plus its following error."""
-    values = station.robot.values
-    position, error = values.get(f"{joint}.position"), values.get(f"{joint}.following_error")
-    told = values.get(f"{joint}.target_position")
-    if told is not None or position is None or error is None:
-        return told
-    return position + error
-
-
-def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
-    """Return the torque as a share of what the drive may give, where that is known."""
-    plain = _value(station, joint, "torque", desk, stale=stale)
-    value, held = (
-        station.robot.values.get(f"{joint}.torque"),
-        station.robot.parameters.get(f"{joint}.max_torque"),
-    )
-    if value is None or held is None or not held.value or held.unit != SI["torque"]:
-        return plain
-    limit, share = f"{held.value * _unit(desk, 'torque').scale:g}", value / held.value
-    text = f"{plain.text} / {limit}"
-    if stale:
-        return Cell(text, plain.colour)
-    colour = "bad" if abs(share) >= 1.0 else "warn" if abs(share) >= NEAR_LIMIT else "accent"
-    return Cell(text, plain.colour, Bar(share, colour), f"{100 * abs(share):.0f} % of its limit")
-
-
-def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
-    """Return the drive's error code in words, or what is wrong with the component.
-
-    Nothing known is no dash.
-    """
-    code = station.robot.values.get(f"{part.name}.error_code")
-    problem, colour = part.problem or "", colour_of(part.name, station.alarms)
-    if code:
-        number = f"0x{int(code):04X}"
-        found = CODE.search(problem)
-        words = (found["words"] or "").strip() if found and found[0].startswith(number) else ""
-        said = f"{number} {words}" if words else error_text(int(code))
-        return Cell(said, "old" if stale else colour, None, "\n".join(filter(None, (problem, said))))
-    if part.state != "ok" and problem:
-        told = CODE.match(problem.removeprefix(IN_FAULT))  # also where the code is not among what is sent
-        said = told[0].strip() if told else problem
-        return Cell(said, "old" if not station.is_live else colour, None, problem)
-    if stale:
-        return Cell(NOT_KNOWN, "old")
-    return Cell("–", "dim")
-
-
-def _at_fault(station: Station, joints: list[str]) -> frozenset[int]:
-    """Columns of the values that the drives' errors are about."""
-    codes = [int(station.robot.values.get(f"{joint}.error_code") or 0) for joint in joints]
-    return frozenset(ABOUT[code & part] for code in codes for part in FAMILIES if code & part in ABOUT)
-
-
-def _stop(station: Station, joint: str) -> Cell:
-    """Return what has shown that the latest stop stopped this drive.
-
-    Without proof it is not known to have.
-    """
-    stopping = station.stopping
-    proof = stopping.proofs.get(joint)
-    if proof is not None:
-        if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell(ENABLED_AGAIN, "dim", None, f"{proof.text}; enabled again since")
-        colour = "dim" if proof.was_so else "good"
-        return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
-    if stopping.state is StopState.IDLE:
-        return Cell(NONE, "dim", None, "no stop was sent since the window opened")
-    return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

@@ -7,7 +7,7 @@ from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QSizePolicy
 
-from server_gui.views.overview.joint_table import ANGLE, TORQUE
+from server_gui.views.overview.joint_cells import ANGLE, TORQUE
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.elided import whole_words
