@@ -199,6 +199,26 @@ def test_an_instant_that_is_gone_is_not_shown_as_another_one(signals: Signals, b
     assert "gone" not in signals.said.text()
 
 
+def test_where_the_page_is_small_an_instant_is_shown_above_what_arranges_it(
+    theme: Theme, bench: Bench
+) -> None:
+    """With large text nothing of a fault's curves was in sight, below the list of channels."""
+    theme.set(scale=1.5)
+    bench.station.take([walking(300)])
+    page = Signals(bench.desk, theme)
+    area = ScrollArea(page)
+    area.resize(480, 500)
+    area.show()
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    page.refresh()
+    settle()
+    page.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    settle()
+    assert page.plots[0].visibleRegion().boundingRect().height() == page.plots[0].height()
+    destroy(area)
+
+
 def test_a_channel_is_listed_in_the_unit_that_it_is_drawn_in(signals: Signals) -> None:
     titles = {str(item.text(0)) for item in signals.channels.items}
     assert {"position  °", "torque  N·m", "cell 0  kPa"} <= titles

@@ -167,6 +167,7 @@ class Signals(QWidget):
         """Choose these, if any, and stand still with the seconds around an instant of the robot's clock."""
         if names:
             self.choose(names)
+            bring_into_sight(self.area, first=True)  # below its tools on a small screen
         self.pause.setChecked(False)  # else it would be what was seen before
         if not self.show_at(at_ns):
             self.pause.setChecked(False)  # nothing else is shown in its place as if it were that
