@@ -14,6 +14,7 @@ from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.desk.confidence import NOT_SEEN, Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.robot import FollowedComponent
 from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.newest_predictions import NOT_YET, STALE_S, Recalled, StationPredictions, Told
@@ -255,15 +256,25 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         yield from _danger(predictions)
     for rule in predictions.rules:
         yield PredictionRow(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
-    told = {alarm.subject: alarm.mark for alarm in station.alarms.each}
-    for part in station.robot.not_ok():
-        why = part.problem or "no reason known"
+    told = {alarm.subject: alarm for alarm in station.alarms.each}
+    for part in unwell(station):
+        alarm = told.get(part.name)
+        why = part.problem or (alarm.what if alarm is not None else "no reason known")
         name = part.name.replace("_", " ")
-        mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
+        mark = Mark("square", "bad", part.state) if alarm is None else alarm.mark  # the same as everywhere
         by = _steps_by(station, part.name)
         yield PredictionRow(mark, f"{name}: {mark.word}", " · ".join(filter(None, (why, by))), by, why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
         yield _learning(adapting)
+
+
+def unwell(station: Station) -> list[FollowedComponent]:
+    """Return the components with which something is wrong: a drive in fault from its first row on.
+
+    What the robot says of a component comes up to a second later.
+    """
+    faults = {alarm.subject for alarm in station.alarms.each if alarm.kind is Kind.FAULT}
+    return [part for part in station.robot.parts.values() if part.state != "ok" or part.name in faults]
 
 
 def _unseen(station: Station) -> str:

@@ -29,7 +29,7 @@ from server_gui.views.marks import Mark
 from server_gui.views.overview.joint_cells import ANGLE, ERROR, STATE, STOP, TORQUE
 from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import PredictionRow
+from server_gui.views.predictions import PredictionRow, lines
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, beside_legs, chain, placed_names
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
@@ -434,3 +434,17 @@ def test_the_ring_stays_as_large_as_lines_below_it_come_and_go(overview: Overvie
         QApplication.processEvents()
         seen.add((overview._ring.height(), overview._plots[0].y()))
     assert len(seen) == 1
+
+
+def test_a_drive_in_fault_is_named_from_its_first_row_on(overview: Overview, bench: Bench) -> None:
+    """Figure and lines of the wearer named it up to a second later: once the robot said so of it."""
+    now_ns = time.monotonic_ns()
+    station = bench.station
+    states: dict[str, list[float | None]] = {f"{joint}.state": [5.0] for joint in JOINTS}
+    states["right_hip.state"] = [7.0]
+    station.take([walking(10), looked(), telemetry([now_ns], states, now_ns)])
+    assert station.robot.not_ok() == []
+    overview.read_now()
+    overview.refresh()
+    assert "right hip not ok" in overview._figure.accessibleDescription()
+    assert any(row.text == "right hip: fault" for row in lines(station))

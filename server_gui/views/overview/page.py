@@ -42,6 +42,7 @@ from server_gui.views.predictions import (
     model_phases,
     most_needed,
     step_phases,
+    unwell,
 )
 from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.robots.others_bar import OthersBar
@@ -400,7 +401,7 @@ class Overview(QWidget):
             side: Pose(*(values.get(f"{side}_{joint}.position") for joint in ("hip", "knee", "ankle")))
             for side in legs_of(station)
         }
-        wrong = frozenset(part.name for part in station.robot.not_ok())
+        wrong = frozenset(part.name for part in unwell(station))
         live = station.is_live
         if slow:
             angle = self._desk.shown.units.unit("position", "rad")
