@@ -161,6 +161,22 @@ def test_what_is_typed_stays_while_live_values_come(page: CommissionPage, played
     assert page.question.field.text() == "12"
 
 
+def test_what_is_typed_before_it_may_be_sent_stays_when_it_may(page: CommissionPage, played: Played) -> None:
+    """It was selected at that moment, and the next key was instead of it: *exo-01* became *-01*."""
+    played.start()
+    played.talker.says(KNEE)
+    played.model.look()
+    draw(page)
+    assert not page.question.send.isEnabled()
+    page.question.field.setFocus()
+    QTest.keyClicks(page.question.field, "12")
+    played.now_s += 1.0
+    draw(page)
+    assert page.question.send.isEnabled()
+    QTest.keyClicks(page.question.field, ".5")
+    assert page.question.field.text() == "12.5"
+
+
 def test_stop_is_sent_when_it_is_pressed_whatever_else_is_so(page: CommissionPage, played: Played) -> None:
     playing.working(played)
     draw(page)

@@ -138,7 +138,8 @@ class Question(Card):
             self.buttons[0].setFocus()
         elif self._typing.isVisible():
             self.field.setFocus()
-            self.field.selectAll()
+            if not self.field.isModified():  # else the next key would be instead of those that were typed
+                self.field.selectAll()
 
     def _typed(self) -> None:
         if self._commissioning.can_answer:
