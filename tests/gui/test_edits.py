@@ -294,3 +294,18 @@ def test_strides_that_are_too_few_are_dashed_and_said_to_be(bench: Bench, parts:
         bench.station.judged.take(replace(one, curves=curves))
         parts.edits.refresh()
         assert ("dashed where there are fewer than 8 strides" in parts.edits._legend.text()) is (count < 8)
+
+
+def test_the_legend_speaks_of_no_curve_that_is_not_drawn(bench: Bench, parts: Parts) -> None:
+    one = worse()
+    for before, after, words in (
+        (1, 1, "grey before, in colour after,"),
+        (0, 1, "in colour after; no stride"),
+    ):
+        curves = tuple(
+            Curves(each.channel, each.before if before else None, each.after if after else None)
+            for each in one.curves
+        )
+        bench.station.judged.take(replace(one, curves=curves))
+        parts.edits.refresh()
+        assert parts.edits._legend.text().startswith(words)

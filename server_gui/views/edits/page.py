@@ -51,10 +51,7 @@ NONE: Final = (
     "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
     "torque and gait is judged here, stride by stride, before and after."
 )
-COLOURS: Final = (
-    "grey before, in colour after, over a stride from 0 to 100 %; {}the bands are one standard deviation "
-    "of the strides"
-)
+COLOURS: Final = "{}, over a stride from 0 to 100 %; {}the bands are one standard deviation of the strides"
 DASHED: Final = f"dashed where there are fewer than {FEWEST} strides; "
 AGAIN: Final = "Try it again…"
 AGAIN_TIP: Final = "Stage the same value again, and open its review: nothing is sent before"
@@ -257,7 +254,8 @@ class Edits(QWidget):
             set_text(self.words, with_minus("\n".join(_said(told))))
             sides = (side for one in told.curves for side in (one.before, one.after) if side is not None)
             dashed = DASHED if any(side.cycles < FEWEST for side in sides) else ""
-            set_text(self._legend, COLOURS.format(dashed + (BACK if told.evidence.cycles_back else "")))
+            more = dashed + (BACK if told.evidence.cycles_back else "")
+            set_text(self._legend, COLOURS.format(_sides(told), more))
         set_tip(self.words, "" if told is None else with_minus("\n".join(map(_in_unit, _strong(told)))))
         tried = None if told is None else told.experiment
         self.response.setVisible(tried is not None and self.response.show_response(tried))
@@ -330,6 +328,13 @@ class Edits(QWidget):
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
         self.list.setMinimumWidth(0 if is_narrow else px(LIST))
         self._place()
+
+
+def _sides(told: EditEvidence) -> str:
+    """Return what is drawn in which colour."""
+    if not any(one.before for one in told.curves):
+        return "in colour after; no stride before is known"
+    return "grey before, in colour after" if any(one.after for one in told.curves) else "grey before"
 
 
 def _when(utc_ns: int) -> str:
