@@ -194,6 +194,8 @@ class EventsPanel(QWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(COLUMNS - 1, QHeaderView.ResizeMode.Stretch)
         header.setResizeContentsPrecision(0)  # as wide as what is in sight, not all there is
+        # Without a bar: it hides a row, columns get narrower by that, it goes, and comes again: for ever.
+        self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.table.activated.connect(self._activated)
         self.tools = QWidget()
         tools = QHBoxLayout(self.tools)
