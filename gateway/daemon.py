@@ -60,7 +60,8 @@ class Daemon:
 
         With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`. Where
         it has `rested_without_keys`, it is served without them again. Where the robot's file is `outdated`,
-        everything but a stop is answered with that, and `classic` is not served.
+        everything but a stop is answered with that, `classic` is not served, and without a key that can be
+        used nobody at the network is.
 
         Raises:
             UnsafeListener: one of these sockets must not be served.
@@ -90,6 +91,7 @@ class Daemon:
             lambda: self._loop.post(self._left),
             robot=config.path,
             rested_without_keys=rested_without_keys,
+            needs_key=not config.outdated,
         )
         self._known: KnownClients | None = None  # at the last look, while a client is authenticated
         listeners, registry = self._authentication.listeners, self._service.registry

@@ -92,34 +92,19 @@ def main(arguments: Sequence[str]) -> int:
         return ended.code if isinstance(ended.code, int) else 2
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     handed, kept = inherited(os.environ), os.environ.pop(_VALID, "")
+    by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()
     try:
-        robot, kept = _robot(options, tell=handed is None or not handed.woken)
-    except config.ConfigError as error:
+        robot, text = _robot(options, tell=handed is None or not handed.woken)
+        sockets, daemon = _served(robot, handed, ends_idle=watched is None)
+    except (config.ConfigError, UnsafeListener, KeyProblem, OSError) as error:
         if handed is None:
             raise
         outdated = _robot_of(kept, options, str(error))
         if outdated is None:
             return _refuse(handed, error, kept)
         log.error("%s", error)  # a stop is carried out all the same
-        robot = outdated
-    share_heap()
-    sockets = _listeners(robot, handed)
-    by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()
-    idle = watched is None
-    try:
-        daemon = Daemon(
-            robot,
-            sockets.port,
-            classic=sockets.classic,
-            local=sockets.local,
-            ends_idle=idle,
-            rested_without_keys=sockets.without_keys,
-        )
-    except (UnsafeListener, KeyProblem) as error:
-        if handed is None:
-            sockets.close()
-            raise
-        return _refuse(handed, error, kept)
+        sockets, daemon = _served(outdated, handed, ends_idle=watched is None)
+        text = kept
     if watched is not None:
         daemon.repeat(watched / 2, lambda: systemd_notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
@@ -127,8 +112,38 @@ def main(arguments: Sequence[str]) -> int:
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         if by_hand and not daemon.told:
-            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys), {_VALID: kept})
+            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys), {_VALID: text})
     return 0
+
+
+def _served(
+    robot: config.RobotConfig, handed: Listeners | None, *, ends_idle: bool
+) -> tuple[Listeners, Daemon]:
+    """Return the gateway of this robot, and its sockets; where it cannot be, those are closed that are new.
+
+    Raises:
+        OSError: a socket cannot be opened.
+        UnsafeListener: one must not be served.
+        KeyProblem: the robot's key cannot be used.
+
+    """
+    share_heap()
+    sockets = _listeners(robot, handed)
+    try:
+        daemon = Daemon(
+            robot,
+            sockets.port,
+            classic=sockets.classic,
+            local=sockets.local,
+            ends_idle=ends_idle,
+            rested_without_keys=sockets.without_keys,
+        )
+    except (UnsafeListener, KeyProblem):
+        for one in sockets.all:
+            if handed is None or one not in handed.all:
+                one.close()
+        raise
+    return sockets, daemon
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> tuple[config.RobotConfig, str]:
@@ -154,7 +169,8 @@ def _robot_of(kept: str, options: argparse.Namespace, outdated: str) -> config.R
         robot, _warnings = config.load_bytes(options.config, os.fsencode(kept))
     except config.ConfigError:  # of another version of the program
         return None
-    return replace(_as_told(robot, options), outdated=outdated)
+    told = _as_told(robot, options)  # without what is refused anyway, and needs a socket
+    return replace(told, gateway=replace(told.gateway, classic_port=None), outdated=outdated)
 
 
 def _as_told(robot: config.RobotConfig, options: argparse.Namespace) -> config.RobotConfig:
@@ -183,7 +199,8 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
         try:
             classic = listen(gateway.host, gateway.classic_port, f"{where} classic_port")
         except OSError:
-            port.close()
+            if handed is None:
+                port.close()
             raise
     if handed is None:
         return Listeners(port, classic, _local(robot))

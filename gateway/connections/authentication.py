@@ -1,5 +1,6 @@
 """Authentication of clients: TLS with a key, loopback without one, accounts on the robot."""
 
+import contextlib
 import logging
 import socket
 from collections.abc import Callable, Iterable, Mapping
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from gateway.access.folder import AccessFolder
 from gateway.access.identity import ANYBODY, Identity
+from gateway.certificates import KeyProblem
 from gateway.connections.intake import Admit, Came
 from gateway.connections.listener_kind import ListenerKind, Stream, has_keys_at_start, kind_of
 from gateway.wire import framing
@@ -35,14 +37,16 @@ class Authentication:
         *,
         robot: Path,
         rested_without_keys: bool = False,
+        needs_key: bool = True,
     ) -> None:
         """`complain` of an address, and `finished` after each handshake, are called in any thread.
 
-        `robot` is the robot's file, for messages.
+        `robot` is the robot's file, for messages. Where it does not need its key, and cannot use it, whoever
+        comes with one is sent away, and this computer's accounts are let in.
 
         Raises:
             UnsafeListener: one of these sockets must not be served.
-            KeyProblem: the robot's key cannot be used.
+            KeyProblem: the robot's key is needed and cannot be used.
 
         """
         self._complain = complain
@@ -53,7 +57,10 @@ class Authentication:
         self._admit: Admit = _nobody
         self.has_keys = has_keys_at_start(now=folder.has_keys, rested_without=rested_without_keys)
         kinds = {one: kind_of(one, has_keys=self.has_keys, robot=robot) for one in listeners}
-        self._handshakes = self._made(finished) if ListenerKind.TLS in kinds.values() else None
+        self._handshakes: Handshakes | None = None
+        if ListenerKind.TLS in kinds.values():
+            with contextlib.suppress(*(() if needs_key else (KeyProblem,))):
+                self._handshakes = self._made(finished)
         came = {
             ListenerKind.PLAIN: self._came_plainly,
             ListenerKind.TLS: self._came_for_tls,
@@ -115,7 +122,9 @@ class Authentication:
         self._admit(connection, _peer(address), ANYBODY)
 
     def _came_for_tls(self, connection: socket.socket, address: Any) -> None:
-        if self._handshakes is not None:
+        if self._handshakes is None:
+            connection.close()
+        else:
             self._handshakes.take(connection, _peer(address))
 
     def _came_locally(self, connection: socket.socket, _address: Any) -> None:

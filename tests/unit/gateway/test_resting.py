@@ -125,6 +125,47 @@ def test_a_stop_is_carried_out_though_the_file_was_broken_meanwhile(running: Run
     assert stopped["outdated"] == OUTDATED.format(f"{file}: cannot be read: No such file or directory")
 
 
+@pytest.mark.parametrize("host", ["192.0.2.7", "0.0.0.0"])
+def test_a_stop_is_carried_out_though_the_file_asks_meanwhile_for_what_cannot_be_served(
+    running: Running, tmp_path: Path, host: str
+) -> None:
+    """An address that it cannot listen on ended it, one that must not be served had every stop refused."""
+    address, file = processes.address(running), tmp_path / "robot.toml"
+    until(lambda: processes.rests(running.pid), "it rests")
+    asks = f'[gateway]\nhost = "{host}"\nclassic_port = 0'
+    file.write_text(processes.RESTS_SOON.replace("[gateway]", asks), encoding="utf-8")
+    for _ in range(2):
+        with Client(address) as client:
+            assert client.refused("robot.describe").kind == "unavailable"
+        with Client(address) as client:
+            stopped = client.call("robot.stop")
+        assert stopped["held"] is True
+        assert host in stopped["outdated"]
+
+
+def test_a_stop_by_the_unix_socket_is_carried_out_though_the_key_was_damaged_meanwhile(
+    tmp_path: Path,
+) -> None:
+    keyed.keyed(tmp_path)
+    file, local = tmp_path / "robot.toml", tmp_path / "gateway.sock"
+    served = processes.RESTS_SOON.replace("[gateway]", f'[gateway]\nsocket = "{local.name}"')
+    file.write_text(served, encoding="utf-8")
+    with processes.process(*processes.GATEWAY, str(file)) as running:
+        host, port = processes.address(running)
+        until(lambda: processes.rests(running.pid), "it rests")
+        (key,) = tmp_path.rglob("robot.key")
+        key.write_text("damaged", encoding="utf-8")
+        with socket.create_connection((host, port), WAIT_S) as one, contextlib.suppress(ConnectionResetError):
+            assert one.recv(1) == b"", "nobody can be known without a key"
+        with socket.socket(socket.AF_UNIX) as one:
+            one.settimeout(WAIT_S)
+            one.connect(str(local))
+            one.sendall(b'{"jsonrpc":"2.0","id":1,"method":"robot.stop","params":{"reason":"test"}}\n')
+            answer = one.makefile().readline()
+    assert '"held":true' in answer
+    assert "the robot's key" in answer
+
+
 def test_the_file_is_kept_as_it_is_written_whatever_the_locale(tmp_path: Path) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(processes.RESTS_SOON + "# Köhler's knee, 5 °\n", encoding="utf-8")
