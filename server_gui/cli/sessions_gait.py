@@ -91,7 +91,7 @@ def _told(found: RecordedGait) -> Iterator[str]:
 
 def _error(error: Error | None) -> tuple[str, str, str]:
     if error is None:
-        return NONE, NONE, "its drive was never enabled"
+        return NONE, NONE, "no value while its drive was enabled"
     rms, largest = (f"{math.degrees(angle):.2f}°" for angle in (error.rms, error.largest))
     return (
         rms,

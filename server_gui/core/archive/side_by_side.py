@@ -7,6 +7,8 @@ from dataclasses import replace
 from enum import Enum
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from ml.store import StoreError
 from ml.store.sessions import Session
 from server_gui.core.archive.playback import LEAD_NS, Piece, Playback, PlayedRobot
@@ -234,7 +236,10 @@ def _first_strike_ns(tape: Tape) -> int | None:
     wanted = Wiring.of([*tape.units]).channels
     rows = tape.read(tape.first_ns, tape.first_ns + SEARCHED_NS, sorted(wanted))
     found = [one.stamp_ns for one in summarise(rows.stamps_ns, rows.columns).events if _is_left_strike(one)]
-    return min(found) + int(rows.utc_ns[-1] - rows.stamps_ns[-1]) if found else None
+    if not found:
+        return None
+    row = min(int(np.searchsorted(rows.stamps_ns, min(found))), len(rows.stamps_ns) - 1)
+    return min(found) + int(rows.utc_ns[row] - rows.stamps_ns[row])  # its own: UTC may be set meanwhile
 
 
 def _is_left_strike(event: GaitEvent) -> bool:

@@ -43,13 +43,15 @@ def tracking_error(error: Floats, state: Floats | None, enabled: Collection[floa
     """Return the error over all rows in which the drive was enabled; None where there is none.
 
     `error` (rad) and `state` are as long, NaN where there is no value; `enabled` are the numbers of a state
-    in which it follows its target, None: they were not recorded.
+    in which it follows its target, None: they were not recorded. Where nobody knows when it was enabled, the
+    error is over all rows.
     """
     known = ~np.isnan(error)
-    if enabled is not None:
-        known &= False if state is None else np.isin(state, list(enabled))
+    told = None if not enabled or state is None or np.isnan(state).all() else state
+    if told is not None:
+        known &= np.isin(told, list(enabled or ()))
     counted = error[known]
     if not len(counted):
         return None
     rms, largest = float(np.sqrt(np.mean(counted**2))), float(np.max(np.abs(counted)))
-    return Error(rms, largest, enabled is not None)
+    return Error(rms, largest, told is not None)

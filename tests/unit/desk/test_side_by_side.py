@@ -64,6 +64,15 @@ class SteppingTape(KneeTape):
         return super().columns(utc_ns) | {"left_insole.force": np.where(is_up, 0.0, 700.0)}
 
 
+class SetTape(SteppingTape):
+    """Its computer's UTC is set on by three seconds after twenty."""
+
+    def read(self, begin_ns: int, end_ns: int, channels: Sequence[str] | None = None) -> Rows:
+        rows = super().read(begin_ns, end_ns, channels)
+        set_on = np.where(rows.utc_ns - self.first_ns > 20 * SECOND_NS, 3 * SECOND_NS, 0)
+        return Rows(rows.utc_ns, rows.stamps_ns - set_on, rows.columns)
+
+
 class Beside:
     """Both of them, in a thread that does at once what it is given, and a clock that a test moves."""
 
@@ -226,6 +235,16 @@ def test_before_its_beginning_the_second_has_no_row_and_then_its_first(steps: Be
     steps.jump(4.0)
     assert isinstance(station.robot, PlayedRobot)
     assert station.robot.row_ns == steps.second.first_ns + SECOND_NS - SECOND_NS // 10
+
+
+def test_a_heel_strike_is_of_the_utc_of_its_own_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    tapes = (SteppingTape("first", 1_700_000_000, 5), SetTape("second", 1_700_100_000, 2))
+    made = Beside(monkeypatch, *tapes)
+    made.both.open(made.second.session)
+    made.draw()
+    made.jump(10.0)
+    assert made.both.by is By.FIRST_STRIKE
+    assert apart_s(made) == pytest.approx(-3.0, abs=0.01)
 
 
 def test_steps_that_cannot_be_read_are_not_called_none(beside: Beside) -> None:

@@ -1,6 +1,7 @@
 """Range of motion and tracking error of one joint."""
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -33,11 +34,17 @@ def test_a_tracking_error_is_that_of_times_in_which_the_drive_was_enabled() -> N
     found = tracking_error(error, state, {ON})
     assert told(found) == (pytest.approx(0.1), pytest.approx(0.1), True)
     assert tracking_error(error, np.full(6, OFF), {ON}) is None
-    assert tracking_error(error, None, {ON}) is None, "its state was to be recorded, and was not"
 
 
-def test_an_error_of_a_drive_whose_states_nobody_knows_says_so() -> None:
-    found = tracking_error(np.array([0.3, NAN, -0.4]), np.array([ON, OFF, OFF]), None)
+@pytest.mark.parametrize(
+    ("state", "enabled"),
+    [([ON, OFF, OFF], None), ([ON, OFF, OFF], ()), ([NAN, NAN, NAN], {ON}), (None, {ON})],
+)
+def test_an_error_of_a_drive_whose_states_nobody_knows_says_so(
+    state: list[float] | None, enabled: Collection[float] | None
+) -> None:
+    """It said that the drive was never enabled."""
+    found = tracking_error(np.array([0.3, NAN, -0.4]), None if state is None else np.array(state), enabled)
     assert told(found) == (pytest.approx(math.sqrt(0.125)), pytest.approx(0.4), False)
 
 
