@@ -136,6 +136,17 @@ def test_where_too_little_was_labelled_that_is_said_and_no_percentage(
     assert "100" not in line.text + line.detail + line.short + line.tip
 
 
+def test_labels_of_one_class_prove_nothing_of_a_model_that_knows_more(station: Station) -> None:
+    quality = Quality(600, 600, 0, 0, {"walk": {"walk": 600}}, seconds=300, recordings=3)
+    station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
+    line = activity(station)
+    assert line.text == "Walk"
+    assert line.short == "predicted, only walk was labelled"
+    both = msgspec.structs.replace(quality, confusion={"walk": {}, "sit": {}})
+    station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=both))
+    assert activity(station).text == "Walk 94 %"
+
+
 @pytest.mark.parametrize(
     ("label", "novelty", "said"),
     [

@@ -9,9 +9,9 @@ from ml.registry.card import DataSource
 from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
-from server_gui.core.models.names import told_task
+from server_gui.core.models.names import class_name, told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
-from server_gui.core.prediction.state import TOO_LITTLE, Quality
+from server_gui.core.prediction.state import TOO_LITTLE, Quality, share
 from server_gui.core.tuning.stop import ENABLED, is_off
 
 NOT_SEEN: Final = ("lost", "stale")
@@ -56,6 +56,9 @@ def belief(told: Told) -> Confidence:
         return Confidence(Worth.UNCHECKED, (f"not yet checked on this robot, {about}", "not yet checked"))
     if not quality.is_enough:
         return Confidence(Worth.UNCHECKED, (f"{TOO_LITTLE} ({quality.basis})", TOO_LITTLE))
+    if (lone := quality.lone_class(predicted.card.classes)) is not None:
+        said = f"only {class_name(lone)} was labelled"
+        return Confidence(Worth.UNCHECKED, (f"{said}, which proves nothing of the rest", said))
     return Confidence(Worth.CHECKED, _checked(quality))
 
 
@@ -82,7 +85,7 @@ def blind(station: Station) -> str:
 
 
 def _checked(quality: Quality) -> tuple[str, ...]:
-    short = f"right {100 * quality.right / quality.labelled:.0f} % last week"
+    short = f"right {share(quality.right, quality.labelled, 0)} % last week"
     return f"{short} ({quality.basis})", short
 
 

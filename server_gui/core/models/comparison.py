@@ -117,8 +117,8 @@ def week_short(entry: Entry) -> str:
 
 def _week_of(entry: Entry, quality: Quality) -> str:
     """Return how right it is; where all labels are of one class that proves nothing of the others."""
-    if len(quality.confusion) == 1 and len(entry.card.classes) > 1:
-        return f"only {class_name(next(iter(quality.confusion)))} labelled"
+    if (lone := quality.lone_class(entry.card.classes)) is not None:
+        return f"only {class_name(lone)} labelled"
     return f"{quality.shares[0]} of {quality.duration}" if quality.is_enough else TOO_LITTLE
 
 

@@ -1,5 +1,6 @@
 """Report on prediction, for `gwrms collect --status` and others; needs no scikit-learn."""
 
+from collections.abc import Collection
 from datetime import datetime
 from typing import Final
 
@@ -60,14 +61,25 @@ class Quality(Struct, frozen=True):
         if self.labelled < FEW:
             right, wrong, unsaid = (f"{count} of {self.labelled}" for count in counts)
         else:
-            right, wrong, unsaid = (f"{100 * count / self.labelled:.1f} %" for count in counts)
+            right, wrong, unsaid = (f"{share(count, self.labelled, 1)} %" for count in counts)
         return right, wrong, unsaid
+
+    def lone_class(self, classes: Collection[str]) -> str | None:
+        """Return the only class that was labelled, of a model that knows more: no proof of those."""
+        return next(iter(self.confusion)) if len(self.confusion) == 1 < len(classes) else None
 
     @property
     def text(self) -> str:
         """In words."""
         right, wrong, unsaid = self.shares
         return f"{right} right, {wrong} wrong, {unsaid} not said of {self.labelled} labelled"
+
+
+def share(count: int, of: int, digits: int) -> str:
+    """Return a percentage; all or nothing is said only of all or nothing."""
+    least = 10.0**-digits
+    percent = 100 * count / of
+    return f"{min(max(percent, least), 100.0 - least) if 0 < count < of else percent:.{digits}f}"
 
 
 Figures = dict[str, dict[str, dict[str, Quality]]]  # by robot, task and model

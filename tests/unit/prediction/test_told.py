@@ -9,7 +9,7 @@ from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.prediction.live import Watched
 from server_gui.core.prediction.news import Predicted
-from server_gui.core.prediction.state import Quality
+from server_gui.core.prediction.state import Quality, share
 from server_gui.terminal.predictions import made, told
 from tests.unit.ml.serving.small import learned
 from tests.unit.prediction.robots import ROBOT, card
@@ -56,3 +56,17 @@ def test_a_model_that_says_nothing_has_no_phase_to_show(label: str) -> None:
 @pytest.mark.parametrize(("hours", "words"), [(1, "today"), (25, "1 day ago"), (49, "2 days ago")])
 def test_a_models_age_is_in_days(hours: float, words: str) -> None:
     assert made(card(learned(), made=datetime.now(UTC) - timedelta(hours=hours))) == words
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "digits", "said"),
+    [
+        (9996, 10_000, 1, "99.9"),
+        (10_000, 10_000, 1, "100.0"),
+        (4, 10_000, 1, "0.1"),
+        (0, 9, 1, "0.0"),
+        (299, 300, 0, "99"),
+    ],
+)
+def test_all_or_nothing_is_said_only_of_all_or_nothing(count: int, of: int, digits: int, said: str) -> None:
+    assert share(count, of, digits) == said
