@@ -138,6 +138,19 @@ def test_a_drive_that_was_not_found_yet_and_stays_enabled_is_no_confirmed_stop(
     assert stopped.words == "NOT CONFIRMED: node 6 is unconfirmed"
 
 
+def test_a_second_axis_of_a_node_is_stopped_and_looked_at_though_no_file_names_it(
+    tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("node.5", "identity", [0, 0, 5])
+    second = {(0x6840, 0): b"\x0f\x00", (0x6841, 0): b"\x27\x00"}  # which stays in operation enabled
+    with enabled(request, 5, objects=second) as drive:
+        stopped = stop(bench, draft)
+        assert drive.objects[0x6840, 0] == b"\x02\x00", "a quick stop"
+    assert stopped.drives == {"node 5": "confirmed", "node 5, axis 1": "unconfirmed"}
+    assert not stopped.confirmed
+
+
 def test_a_node_without_a_controlword_is_no_drive_that_has_to_stop(
     tmp_path: Path, bench: CanBench, request: pytest.FixtureRequest
 ) -> None:

@@ -5,14 +5,17 @@ import math
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from gateway.wire.stop import Stopped
 from server_gui.cli.collect import status_text
 from server_gui.core.desk.recording import By, Recording, Tone
 from server_gui.core.fleet.collector import Collector
+from server_gui.core.fleet.live_prediction import _said
 from server_gui.core.follow.news import News
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
@@ -224,3 +227,9 @@ def test_nobody_answering_is_not_called_recording() -> None:
     recording._keeper = SimpleNamespace()
     recording._asking, recording._asked_ns = True, time.monotonic_ns() - 3_000_000_000
     assert recording.said(None).tone is Tone.BAD
+
+
+def test_what_a_rules_stop_did_says_why_it_is_not_confirmed() -> None:
+    answer: Future[Stopped] = Future()
+    answer.set_result(Stopped({"knee": "confirmed"}, held=True, outdated="robot.toml: is broken"))
+    assert _said(answer) == "knee confirmed, not confirmed: robot.toml: is broken"

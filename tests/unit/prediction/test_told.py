@@ -70,3 +70,8 @@ def test_a_models_age_is_in_days(hours: float, words: str) -> None:
 )
 def test_all_or_nothing_is_said_only_of_all_or_nothing(count: int, of: int, digits: int, said: str) -> None:
     assert share(count, of, digits) == said
+
+
+def test_a_minute_in_two_recordings_is_just_enough() -> None:
+    assert Quality(600, 600, 0, 0, {}, 60, 2).is_enough
+    assert not Quality(600, 600, 0, 0, {}, 59, 2).is_enough
