@@ -289,7 +289,7 @@ class Daemon:
 
 
 def _only_a_stop(why: str) -> framing.RpcError:
-    return framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{why}\n{STOP_ALONE}")
+    return framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{why}; {STOP_ALONE}")
 
 
 @contextlib.contextmanager

@@ -99,7 +99,7 @@ def main(arguments: Sequence[str]) -> int:
     except (config.ConfigError, UnsafeListener, KeyProblem, OSError) as error:
         if handed is None:
             raise
-        outdated = _robot_of(kept, options, str(error))
+        outdated = _robot_of(kept, options, "; ".join(str(error).splitlines()))
         if outdated is None:
             return _refuse(handed, error, kept)
         log.error("%s", error)  # a stop is carried out all the same

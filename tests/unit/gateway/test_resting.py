@@ -99,7 +99,7 @@ def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running,
     until(lambda: processes.rests(running.pid), "it rests")
     file.write_text("[robot]\n", encoding="utf-8")
     with Client(address) as client:
-        said = f"{file}: [robot] name: is missing\n{STOP_ALONE}"
+        said = f"{file}: [robot] name: is missing; {STOP_ALONE}"
         assert str(client.refused("robot.describe")) == said
     file.write_text(processes.RESTS_SOON, encoding="utf-8")
     until(lambda: processes.rests(running.pid), "it rests again")
