@@ -17,9 +17,10 @@ from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.marks import ENABLED, GLYPHS
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.alarms.texts import RESET_BUTTON
+from server_gui.core.alarms.unconfirmed import enabled_again, enabled_mark
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -152,7 +153,7 @@ def joints(station: Station, look: PanelWidths) -> RenderableType:
         past = past[::ROWS_A_BLOCK]
         grid.add_row(
             words(name.replace("_", " "), style=side_colour(name)),
-            _drive(robot, name, stale),
+            _drive(station, name, stale),
             words(degrees(value), style=colour),
             words(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, look.angle), style=colour),
             words(sparkline(past, *_spark_range(past), look.past), style=colour),
@@ -167,7 +168,8 @@ def _spark_range(past: list[float | None]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _drive(robot: Robot, name: str, stale: bool) -> Text:
+def _drive(station: Station, name: str, stale: bool) -> Text:
+    robot = station.robot
     part = robot.parts[name]
     if part.state in ("stale", "lost"):
         return _part_state(robot, name)
@@ -175,7 +177,10 @@ def _drive(robot: Robot, name: str, stale: bool) -> Text:
     if stale or word is None:
         return words(word or NONE, style=OLD)
     code = robot.values.get(f"{name}.error_code")
-    return state_text(word, f"0x{int(code):04X}" if code else "")
+    more = f"0x{int(code):04X}" if code else ""
+    if word == ENABLED:
+        return mark_text(enabled_mark(robot, station.stopping), more)
+    return state_text(word, more)
 
 
 def _part_state(robot: Robot, name: str) -> Text:
@@ -330,6 +335,9 @@ def news_lines(station: Station, controls: Controls, where: str, columns: int) -
 def _news(station: Station, controls: Controls, where: str) -> Text:
     """Return the one thing that matters most now."""
     robot, writing = station.robot, station.writing
+    active, newest = station.alarms.active, next(iter(station.news.items), None)
+    if enabled_again(robot, station.stopping):
+        return _alarm(active, controls)
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
     if controls.refusal:
@@ -338,7 +346,6 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
         return words(controls.note, style=WARN)
     if writing.state in NOT_WRITTEN:
         return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
-    active, newest = station.alarms.active, next(iter(station.news.items), None)
     if (
         newest is not None
         and newest.kind in (NewsKind.STOP, NewsKind.RESET)

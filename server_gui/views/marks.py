@@ -9,7 +9,6 @@ from PySide6.QtGui import QBrush, QColor, QPainter, QPen, QPolygonF
 from server_gui.core.alarms.marks import (
     NEWS,
     STATES,
-    STILL_ENABLED,
     Mark,
     age_text,
     drives_mark,
@@ -22,7 +21,6 @@ __all__ = [
     "NEWS",
     "SHORTER",
     "STATES",
-    "STILL_ENABLED",
     "Mark",
     "age_text",
     "day_and_time",

@@ -42,7 +42,8 @@ STATES: Final = {
     "fault reaction active": Mark("square", "bad", "fault reaction"),
 }
 
-STILL_ENABLED: Final = Mark("square", "bad", ENABLED)  # after a STOP that is not confirmed
+STILL_ENABLED: Final = Mark("square", "bad", ENABLED)  # after a STOP that is not confirmed, or again since
+ASKED: Final = Mark("half", "warn", ENABLED)  # while a stop is sent or held, by rows of before
 
 NEWS: Final = {
     NewsKind.LINK: Mark("cross", "bad", "LINK"),
@@ -65,10 +66,10 @@ def state_mark(word: str | None) -> Mark:
     return NOT_KNOWN if word is None else STATES.get(word.lower(), Mark("triangle", "warn", word))
 
 
-def drives_mark(robot: Robot, *, is_unproven: bool = False) -> Mark:
+def drives_mark(robot: Robot, enabled: Mark) -> Mark:
     """Return all drives in one: enabled only where every one is, the worst otherwise.
 
-    `is_unproven`: they were told to stop and have not shown it; then enabled is no good state.
+    `enabled` is the mark of one that is enabled: no good state while a stop is sent or held.
     """
     joints = robot.names("joint")
     if not joints:
@@ -76,16 +77,18 @@ def drives_mark(robot: Robot, *, is_unproven: bool = False) -> Mark:
     if robot.is_stale():
         return Mark("ring", "old", "drives not known now")
     words = [robot.word(f"{joint}.state") for joint in joints]
-    for bad in ("fault", "fault reaction active", "quick stop active"):
+    count = words.count(ENABLED)
+    some = Mark("half", "bad" if enabled.colour == "bad" else "warn", f"{count} of {len(joints)} enabled")
+    is_bad = count > 0 and some.colour == "bad"  # then nothing that is less so hides it
+    for bad in ("fault", "fault reaction active", *(() if is_bad else ("quick stop active",))):
         if bad in words:
             return Mark(STATES[bad].shape, STATES[bad].colour, f"{words.count(bad)} in {bad}")
-    enabled = words.count(ENABLED)
-    if None in words:
+    if None in words and not is_bad:
         return Mark("ring", "old", f"{words.count(None)} of {len(joints)} drives not known")
-    if enabled == len(joints):
-        return STILL_ENABLED if is_unproven else STATES[ENABLED]
-    if enabled:
-        return Mark("half", "bad" if is_unproven else "warn", f"{enabled} of {len(joints)} enabled")
+    if count == len(joints):
+        return enabled
+    if count:
+        return some
     return state_mark(words[0]) if len(set(words)) == 1 else Mark("half", "warn", "drives differ")
 
 

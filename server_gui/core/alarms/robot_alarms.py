@@ -23,7 +23,7 @@ from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
 from server_gui.core.alarms.simulated import is_simulated, without_wires
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.alarms.unconfirmed import unconfirmed_alarm
+from server_gui.core.alarms.unconfirmed import again_alarm, enabled_again, unconfirmed_alarm
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
@@ -107,7 +107,9 @@ def _found(facts: Facts) -> Iterator[Alarm]:
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
         yield unconfirmed_alarm(robot, stopping)
-    elif stopping.held:
+    elif enabled_again(robot, stopping):
+        yield again_alarm(robot, stopping)
+    elif stopping.held and not (stopping.state is StopState.SENT and any_enabled(robot)):
         what, by = stopping.said
         yield Alarm(
             Kind.STOPPED,
@@ -359,7 +361,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
 def undriven(robot: Robot, stopping: StopProgress) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
     words = [None if word is None else word.lower() for word in state_words(robot).values()]
-    if stopping.held:
+    if stopping.held and not enabled_again(robot, stopping):
         return HELD
     if _QUICK_STOP in words:
         return STOPPING

@@ -14,6 +14,7 @@ class Kind(Enum):
     """What sort of thing is wrong; the worst comes first."""
 
     STILL_MOVING = "STILL MOVING"  # after a STOP that is not confirmed
+    ENABLED_AGAIN = "ENABLED AGAIN"  # while a stop is held
     NOT_STOPPED = "STOP NOT CONFIRMED"
     ANOTHER = "ANOTHER ROBOT ANSWERS"
     NEVER_REACHED = "never reached"
@@ -42,7 +43,7 @@ class Kind(Enum):
     RESET = "stop reset"
 
 
-UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.NOT_STOPPED})
+UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.ENABLED_AGAIN, Kind.NOT_STOPPED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
         _text(Kind.STILL_MOVING, "square", "bad", "STOP again, or use the hardware stop"),
+        _text(Kind.ENABLED_AGAIN, "square", "bad", "STOP again, or use the hardware stop"),
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
         _text(
             Kind.ANOTHER,

@@ -1,4 +1,4 @@
-"""A STOP that is not confirmed: whether the robot moves still, and what is to be done first."""
+"""A robot that has not stopped, or is enabled again: which of it, and what is to be done first."""
 
 from typing import Final
 
@@ -12,13 +12,14 @@ from server_gui.core.alarms.drive_states import (
     moving_joints,
     state_words,
 )
-from server_gui.core.alarms.marks import ENABLED
+from server_gui.core.alarms.marks import ASKED, ENABLED, STATES, STILL_ENABLED, Mark
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.robot import Robot
-from server_gui.core.tuning.stop import StopProgress, is_off
+from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
 STOP_AGAIN: Final = "STOP again"
 KEEP_AT_HAND: Final = "keep the hardware stop at hand"
+USE_HARDWARE: Final = "use the hardware stop"
 NO_LINK: Final = "no link, nothing was sent"
 
 
@@ -27,13 +28,48 @@ def unconfirmed(robot: Robot) -> Kind:
     return Kind.STILL_MOVING if is_live(robot) and moving_joints(robot) else Kind.NOT_STOPPED
 
 
+def enabled_again(robot: Robot, stopping: StopProgress) -> list[str]:
+    """Return joints whose drive is enabled while a stop is held, by a row that is newer than what says so.
+
+    None while a STOP is on its way or not confirmed, which is told of it then.
+    """
+    is_open = stopping.state in (StopState.SENT, StopState.NOT_CONFIRMED)
+    if is_open or not stopping.held or not is_live(robot) or not robot.is_newer_than(stopping.held_ns):
+        return []
+    return [joint for joint, word in state_words(robot).items() if word == ENABLED]
+
+
+def enabled_mark(robot: Robot, stopping: StopProgress) -> Mark:
+    """Return the mark of a drive that is enabled: no good state while a stop is sent or held."""
+    if stopping.is_unproven or enabled_again(robot, stopping):
+        return STILL_ENABLED
+    return ASKED if stopping.held or stopping.state is StopState.SENT else STATES[ENABLED]
+
+
+def unstopped(robot: Robot, stopping: StopProgress) -> Kind | None:
+    """Return what a robot is in that was to stop and has not, or has not stayed so: the same everywhere."""
+    if stopping.is_unproven:
+        return unconfirmed(robot)
+    return Kind.ENABLED_AGAIN if enabled_again(robot, stopping) else None
+
+
+def again_alarm(robot: Robot, stopping: StopProgress) -> Alarm:
+    """Return the alarm of drives that are enabled while a stop is held."""
+    again = enabled_again(robot, stopping)
+    what = f"all {len(again)} drives" if len(again) == len(robot.names("joint")) > 1 else listed(again)
+    check, (how, by) = ", ".join(remedy(robot, stopping)), stopping.said
+    aside = f"a stop is held: {'; '.join(filter(None, (how, by)))}"
+    return Alarm(Kind.ENABLED_AGAIN, "", what, check=check, aside=aside)
+
+
 def unconfirmed_alarm(robot: Robot, stopping: StopProgress) -> Alarm:
     """Return the alarm; what is to be done stands before its cause."""
     kind, first = unconfirmed(robot), ", ".join(remedy(robot, stopping))
     cause, _, more = stopping.why.partition("; ")
     aside = ""
     if kind is Kind.STILL_MOVING:
-        what, more, aside = STOP_AGAIN, "", f"the STOP before failed: {_then(stopping.why)}"
+        to_do = USE_HARDWARE if stopping.is_outdated else STOP_AGAIN
+        what, more, aside = to_do, "", f"the STOP before failed: {_then(stopping.why)}"
     elif silent := silent_controllers(robot, stopping):
         what, more = silent, ""
     else:
@@ -67,13 +103,18 @@ def _then(why: str) -> str:
 
 
 def remedy(robot: Robot, stopping: StopProgress) -> tuple[str, ...]:
-    """Return what to do after a STOP that nobody has confirmed, the first thing first."""
+    """Return what to do where a robot has not stopped, or not stayed so, the first thing first.
+
+    No STOP can be confirmed by a robot whose file cannot be used.
+    """
+    if stopping.is_outdated:
+        return (USE_HARDWARE,)
     if silent_controllers(robot, stopping):
         return KEEP_AT_HAND, f"check {', '.join(_spoken_node(robot, name) for name in stopping.silent)}"
     is_off = is_live(robot) and None not in state_words(robot).values() and not moving_joints(robot)
     if is_off:
         return ("STOP again to be sure",)
-    return (STOP_AGAIN, "or use the hardware stop") if is_live(robot) else ("use the hardware stop",)
+    return (STOP_AGAIN, f"or {USE_HARDWARE}") if is_live(robot) else (USE_HARDWARE,)
 
 
 def _after_unconfirmed(robot: Robot) -> str:

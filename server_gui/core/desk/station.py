@@ -183,7 +183,7 @@ class Station:
     @property
     def mark(self) -> Mark:
         """How it is, in one mark and word: the same wherever it is shown."""
-        return worst(self.robot, self.alarms)
+        return worst(self.robot, self.alarms, self.stopping)
 
     def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
         """Note something about this robot, or about a component of it."""

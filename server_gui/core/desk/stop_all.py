@@ -7,9 +7,15 @@ from typing import Final, Protocol
 
 from gateway.amounts import counted
 from server_gui.core.alarms.drive_states import is_live, listed, state_words
-from server_gui.core.alarms.marks import ENABLED, Mark
+from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.alarms.unconfirmed import STOP_AGAIN, remedy, silent_controllers, unconfirmed
+from server_gui.core.alarms.unconfirmed import (
+    STOP_AGAIN,
+    enabled_again,
+    remedy,
+    silent_controllers,
+    unconfirmed,
+)
 from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import StopProgress, StopState
 
@@ -63,7 +69,7 @@ class Standing:
 class StopAll:
     """The robots that STOP ALL was sent to; each counts as its own STOP says, the newest one.
 
-    One that is removed before it was confirmed, or that has not stopped, stays named until the next STOP ALL.
+    One that is removed before it was confirmed, or seen to have stopped, stays named until the next STOP ALL.
     """
 
     def __init__(self, robots: Sequence[Stopped]) -> None:
@@ -76,7 +82,7 @@ class StopAll:
             return
         self._robots.remove(robot)
         standing = _standing(robot)
-        if standing.how in (How.WAITING, How.NOT_STOPPED):
+        if standing.how in (How.WAITING, How.OLD, How.NOT_STOPPED):
             self._removed.append(_removed(standing))
 
     def look(self) -> StopAllResult | None:
@@ -125,8 +131,9 @@ def _confirmed(one: Stopped) -> Standing:
     if not one.robot.is_newer_than(one.stopping.answered_ns):
         return Standing(one.title, How.STOPPED)  # the drives' own answer is the newest that is known
     words = state_words(one.robot)
-    if enabled := [joint for joint, word in words.items() if word == ENABLED]:
-        return _not_stopped(one, "ENABLED AGAIN", listed(enabled))
+    if again := enabled_again(one.robot, one.stopping):
+        to_do = remedy(one.robot, one.stopping)
+        return _not_stopped(one, TEXTS[Kind.ENABLED_AGAIN].mark.word, listed(again), to_do)
     if unknown := [joint for joint, word in words.items() if word is None]:
         brief = f"{AS_FAR}: state not known"
         return Standing(one.title, How.OLD, brief, f"{brief} of {listed(unknown)}")
@@ -141,6 +148,9 @@ def _not_stopped(
 
 def _removed(standing: Standing) -> Standing:
     """Return how one stands that nobody sees any more: never better than it was."""
+    if standing.how is How.OLD:
+        why = f"{standing.why}; removed from this window → look at the robot itself"
+        return replace(standing, brief=f"removed, {standing.brief}", why=why)
     word = TEXTS[Kind.NOT_STOPPED].mark.word
     before = f"last seen {standing.brief}" if standing.brief else "before it answered"
     why = f"{word}: removed from this window, {before} → use the hardware stop"
@@ -174,7 +184,8 @@ def _drives(robots: Sequence[Stopped], standings: Sequence[Standing]) -> str:
         return ""
     confirmed = sum(len(one.confirmed) for one in told)
     known = [len(one.stopping.confirmed | set(one.robot.names("joint"))) for one in robots]
-    is_whole = all(known) and len(known) == len([one for one in standings if one.how is not How.RESET])
+    is_whole = all(known) and len(robots) == len(standings)  # else one is removed
+    is_whole = is_whole and all(one.how is not How.RESET for one in standings)
     every = f"/{sum(known)}" if is_whole else ""
     after_ms = [ms for one in told if (ms := one.slowest_ms) is not None]
     one_drive = confirmed == 1 and not every

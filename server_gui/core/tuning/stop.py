@@ -17,6 +17,7 @@ AGAIN = "stopped again"  # while one is held: by somebody, or a drive by the gat
 CLOCKS_NS = 50_000_000  # that ours and a robot's are compared to
 
 
+LEAST_MS = 1.0  # nothing is said to have stopped in 0 ms
 LOOKS = 2  # at the journal: what comes later was written since the STOP
 
 
@@ -69,7 +70,7 @@ class Proof:
     @property
     def when(self) -> str:
         """After the STOP."""
-        return "already off" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
+        return "already off" if self.was_so else f"{max(self.after_ms, LEAST_MS):.0f} ms"
 
     @property
     def text(self) -> str:
@@ -88,6 +89,7 @@ class StopProgress:
     text: str = ""
     why: str = ""  # it is not confirmed
     held: bool = False
+    is_outdated: bool = False  # the robot's file cannot be used: it can confirm none
     reason: str = ""  # of the one that is held
     was_ended: bool = False  # by a reset, since when nothing was enabled
     at_ns: int | None = None
@@ -97,6 +99,7 @@ class StopProgress:
     drives: int = 0  # that have confirmed it
     silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
+    _heard_ns: int = 0  # when one was first known to be held by the robot's word, not by our STOP's answer
     _off: set[str] = field(default_factory=set)  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
     _clock: ClockOffset | None = None  # of the robot when it was sent
@@ -137,6 +140,7 @@ class StopProgress:
             self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, set(off), clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
         self.silent, self._confirmed, self.was_ended, self._is_written = (), (), False, False
+        self.is_outdated = False
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
@@ -145,12 +149,14 @@ class StopProgress:
             return
         self.held = stopped.held
         if self.at_ns is not None:
-            self.answered_ms = ((time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns) / 1e6
+            after_ns = (time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns
+            self.answered_ms = max(LEAST_MS, after_ns / 1e6)
         self._confirmed = {name for name, said in stopped.drives.items() if said == "confirmed"}
         self.proofs = {drive: self._earliest(drive, proof) for drive, proof in self.proofs.items()}
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
         missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
-        if stopped.drives and len(self._confirmed) == len(stopped.drives):
+        self.is_outdated = stopped.outdated is not None
+        if stopped.drives and len(self._confirmed) == len(stopped.drives) and not self.is_outdated:
             self.silent = tuple(name for name, said in stopped.controllers.items() if said != "confirmed")
         if stopped.outdated is not None:
             missing.append(stopped.outdated)
@@ -171,7 +177,7 @@ class StopProgress:
         self.held = held
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
-            self.silent, self._confirmed = (), ()  # of one that is over: they say nothing of the next one
+            self.silent, self._confirmed, self.is_outdated = (), (), False  # they say nothing of the next one
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
 
     # --- what the robot shows meanwhile
@@ -181,6 +187,7 @@ class StopProgress:
 
         `is_anew`: its computer has started again since.
         """
+        self._hears(held)
         self.held, self.reason = held, (reason or "") if held else ""
         if not held and self.state is StopState.CONFIRMED and (self._is_written or is_anew):
             self.was_reset(held=False)
@@ -203,6 +210,7 @@ class StopProgress:
             if self._is_after(entry, boot_id):
                 self._read(entry, is_open=is_open)
             elif entry.get("what") in HELD_BY and not self.held:  # held still, as far as is read
+                self._hears(True)
                 self.held, self.reason, is_older = True, _said(entry), True
             elif is_older and _is_reset(entry):
                 self.held, self.reason, is_older = False, "", False
@@ -280,7 +288,7 @@ class StopProgress:
             elif after_ns < -self._sure_ns:
                 self._off.add(drive)
             elif after_ns >= 0:
-                proof = Proof(0.0 if drive in self._off else after_ns / 1e6, word)
+                proof = Proof(0.0 if drive in self._off else max(LEAST_MS, after_ns / 1e6), word)
                 self.proofs[drive] = self._earliest(drive, proof)
                 return
 
@@ -315,7 +323,7 @@ class StopProgress:
             return None
         after_ms = [proof.after_ms for drive in asked if (proof := self.proofs.get(drive)) is not None]
         is_shown = len(after_ms) == len(asked)
-        return max(1.0, *after_ms) if is_shown else self.answered_ms or 0.0
+        return max(LEAST_MS, *(after_ms if is_shown else [self.answered_ms or 0.0]))
 
     @property
     def answered_ns(self) -> int:
@@ -323,6 +331,11 @@ class StopProgress:
         if self.at_ns is None or self.answered_ms is None:
             return 0
         return self.at_ns + round(self.answered_ms * 1e6)
+
+    @property
+    def held_ns(self) -> int:
+        """Since when a stop is known to be held, on our clock: rows of before say nothing against it."""
+        return max(self.answered_ns, self._heard_ns)
 
     @property
     def already_off(self) -> frozenset[str]:
@@ -344,7 +357,7 @@ class StopProgress:
         """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
-        slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))
+        slowest = max(LEAST_MS, *(proof.after_ms for proof in self.proofs.values()))
         by_state: dict[str, list[str]] = {}
         for drive, proof in self.proofs.items():
             by_state.setdefault(proof.state, []).append(drive)
@@ -370,7 +383,13 @@ class StopProgress:
             self.reason = _said(entry)
         if not self.held:
             self.since_s = _utc_s(entry)
+        self._hears(True)
         self.held, self.was_ended = True, False
+
+    def _hears(self, held: bool) -> None:
+        """Note since when the robot's word is known by which a stop is held; before it is `held`."""
+        if held and not self.held:
+            self._heard_ns = time.monotonic_ns()
 
     def _not_confirmed(self, why: str) -> None:
         self.state, self.why = StopState.NOT_CONFIRMED, why

@@ -9,8 +9,9 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.amounts import counted
 from gateway.wire.stop import ROBOT_RESET
+from server_gui.core.alarms.drive_states import listed
 from server_gui.core.alarms.texts import TEXTS
-from server_gui.core.alarms.unconfirmed import remedy, unconfirmed
+from server_gui.core.alarms.unconfirmed import enabled_again, enabled_mark, remedy, unstopped
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import ENABLED, StopState, is_off
@@ -205,6 +206,13 @@ class Header(QWidget):
 
 def _outcome(station: Station) -> Words:
     stopping = station.stopping
+    kind = unstopped(station.robot, stopping)
+    if kind is not None:
+        mark, to_do = TEXTS[kind].mark, remedy(station.robot, stopping)
+        again = listed(enabled_again(station.robot, stopping))
+        told = f"{mark.word}: {again}" if again else ""
+        tip = "\n".join(filter(None, (told, stopping.text, *stopping.proof_lines)))
+        return Words(mark, mark.word, to_do, tip)
     if stopping.state is StopState.IDLE:
         mark, main = Mark("triangle", "warn", "STOPPED"), "STOP held"
         said = "; ".join(filter(None, stopping.said))
@@ -213,11 +221,7 @@ def _outcome(station: Station) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (stopping.timed(counted(stopping.drives, "drive")),),
-        StopState.NOT_CONFIRMED: remedy(station.robot, stopping),
     }
-    if stopping.is_unproven:
-        mark = TEXTS[unconfirmed(station.robot)].mark
-        return Words(mark, mark.word, parts[stopping.state], tip)
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
 
@@ -238,7 +242,7 @@ def _drives(station: Station) -> Words:
         return Words(Mark("ring", "warn"), "Off when last seen", (no_data(station), count))
     if not station.is_live:
         return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
-    mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
+    mark = drives_mark(station.robot, enabled_mark(station.robot, station.stopping))
     few = SHORTER.get(mark.word, mark.word).capitalize()
     brief = (few, count.removesuffix(" enabled"))
     parts = (*_others(station), count, "CiA 402")

@@ -8,11 +8,12 @@ from gateway.units import Unit, rounded
 from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.severity import colour_of
 from server_gui.core.alarms.texts import error_text
+from server_gui.core.alarms.unconfirmed import enabled_mark
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import FollowedComponent
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.marks import STILL_ENABLED, state_mark
+from server_gui.views.marks import state_mark
 
 # column → quantity; the SI unit of each
 COLUMNS: Final = (
@@ -78,8 +79,7 @@ def row_of(station: Station, joint: str, desk: Desk) -> list[Cell]:
     gone = part.state in ("stale", "lost")
     stale = gone or not station.is_live
     word = part.state if gone else robot.word(f"{joint}.state")
-    unproven = word == ENABLED and station.stopping.is_unproven
-    mark = STILL_ENABLED if unproven else state_mark(word)
+    mark = enabled_mark(robot, station.stopping) if word == ENABLED else state_mark(word)
     colour = colour_of(joint, station.alarms, mark.colour) if gone else mark.colour
     age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]

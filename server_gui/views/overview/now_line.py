@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPus
 
 from gateway.units import Units, rounded
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.alarms.unconfirmed import STOP_AGAIN, unconfirmed
+from server_gui.core.alarms.unconfirmed import enabled_mark, remedy, unstopped
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
@@ -203,16 +203,16 @@ class NowLine(QFrame):
 
 def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
-    if station.stopping.is_unproven:
-        known = drives_mark(station.robot, is_unproven=True).word if station.is_live else "drives not known"
-        led = TEXTS[unconfirmed(station.robot)].mark
-        words = (f"{led.word}: {STOP_AGAIN}",) if led.word == Kind.STILL_MOVING.value else ()
+    mark = drives_mark(station.robot, enabled_mark(station.robot, station.stopping))
+    if (kind := unstopped(station.robot, station.stopping)) is not None:
+        known = mark.word if station.is_live else "drives not known"
+        led, first = TEXTS[kind].mark, remedy(station.robot, station.stopping)[0]
+        words = () if kind is Kind.NOT_STOPPED else (f"{led.word}: {first}",)
         return led, (*words, led.word), (f"{known} · {count}", count)
     if not station.is_live and not is_last_held(station):
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
     if not station.is_live:
         return TEXTS[Kind.STOPPED].mark, _last_since(station), _last_details(station)
-    mark = drives_mark(station.robot)
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details

@@ -19,6 +19,7 @@ from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
 from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.worst_state import STOP_SENT
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
@@ -131,6 +132,8 @@ class RobotCard(ClickableFrame):
 def state_words(station: Station) -> tuple[str, ...]:
     """Return how a robot is, the fullest wording first: the last is the word of its mark, or shorter."""
     mark, worst, stopping = station.mark, station.alarms.worst, station.stopping
+    if mark is STOP_SENT:
+        return (mark.word,)
     where = "" if worst is None or not worst.spoken or worst.spoken in mark.word else worst.spoken
     said = () if worst is None else (worst.brief, f"{mark.word}: {where}" if where else "")
     if stopping.state is StopState.CONFIRMED and worst is not None and worst.kind is Kind.STOPPED:

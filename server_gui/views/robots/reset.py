@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterator
 from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import ROBOT_RESET
+from server_gui.core.alarms.drive_states import listed
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.texts import Kind
-from server_gui.core.alarms.unconfirmed import remedy, silent_controllers
+from server_gui.core.alarms.unconfirmed import enabled_again, remedy, silent_controllers
 from server_gui.core.desk.station import Station
 from server_gui.views.confirmation import Question, ask
 
@@ -19,17 +20,19 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     """Ask whether a held stop is to be ended."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
-    held = f"{_unconfirmed(station)}{held}"
+    held = f"{_unstopped(station)}{held}"
     text = f"{held}\n\n{DOES}\n\nAfterwards, {go_on(Kind.RESET, station.robot)}."
     return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
 
 
-def _unconfirmed(station: Station) -> str:
-    """Return first that the STOP is not confirmed, by whom, and what to do: a reset is no answer to that."""
+def _unstopped(station: Station) -> str:
+    """Return first that it has not stopped, or is enabled again, and what to do: a reset is no answer."""
+    first = ", ".join(remedy(station.robot, station.stopping))
+    if again := enabled_again(station.robot, station.stopping):
+        return f"ENABLED AGAIN: {listed(again)}. First {first}.\n\n"
     if not station.stopping.is_unproven:
         return ""
     why = silent_controllers(station.robot, station.stopping) or station.stopping.why
-    first = ", ".join(remedy(station.robot, station.stopping))
     return f"STOP NOT CONFIRMED: {why}. First {first}.\n\n"
 
 

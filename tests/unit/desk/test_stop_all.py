@@ -345,8 +345,48 @@ def test_a_robot_that_is_removed_before_it_has_stopped_stays_named(
     assert said(two).startswith("STOP ALL: 1 of 1 robot stopped"), "that is of those that are there"
 
 
-def test_a_robot_that_has_stopped_and_then_loses_its_link_may_be_removed(two: Bench) -> None:
+def test_a_robot_that_is_removed_without_a_link_is_no_better_known_to_be_stopped_than_before(
+    two: Bench,
+) -> None:
+    """All that was left said that every robot had stopped."""
     second = confirmed(two)
     gone(second)
     two.desk.remove(second)
-    assert said(two).startswith("STOP ALL: 1 of 1 robot stopped, 6/6 drives confirmed in 34 ms")
+    assert said(two) == (
+        "STOP ALL: 1 of 2 robots stopped, 6 drives confirmed in 34 ms; exo-02 confirmed it, as far as is "
+        "known: no link, what its drives do now is not known; removed from this window → look at the robot "
+        "itself"
+    )
+    result = two.desk.stopped_all
+    assert result is not None
+    assert result.wordings[-1].endswith("; exo-02 removed, confirmed it, as far as is known: no link")
+    assert mark(two) == "warn"
+
+
+def test_a_robot_that_was_seen_to_have_stopped_may_be_removed(two: Bench) -> None:
+    two.desk.remove(confirmed(two))
+    assert said(two) == "STOP ALL: 1 of 1 robot stopped, 6/6 drives confirmed in 34 ms"
+
+
+def test_drives_are_not_counted_of_all_while_one_robot_is_reset_and_another_is_removed(two: Bench) -> None:
+    """The twelve were those of the first two, of three robots."""
+    two.add("exo-03", 7422).take([described("exo-03"), walking(10), looked()])
+    first, second, third = two.desk.stations
+    two.desk.stop_all("test")
+    for station, commands in zip((first, second), two.commands, strict=False):
+        commands.answer(ALL)
+        seen(station)
+    timed(first, 34.0)
+    second.reset()
+    two.commands[1].answer(OFF)
+    two.desk.remove(third)
+    assert said(two).startswith("STOP ALL: 1 of 3 robots stopped, 6 drives confirmed in 34 ms; exo-02 reset")
+
+
+def test_a_stop_that_is_answered_at_once_took_a_millisecond_and_not_none(two: Bench) -> None:
+    """It said: confirmed in 0 ms."""
+    two.desk.stop_all("test")
+    for station, commands in zip(two.desk.stations, two.commands, strict=True):
+        commands.answer(ALL)
+        timed(station, 0.2)
+    assert said(two) == "STOP ALL: 2 of 2 robots stopped, 12/12 drives confirmed in 1 ms"

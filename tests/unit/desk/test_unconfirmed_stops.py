@@ -108,3 +108,22 @@ def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     proofs = bench.station.stopping.proofs
     assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
     assert proofs["left_hip"].when == "already off"
+
+
+def test_where_the_robots_file_cannot_be_used_nobody_says_that_all_drives_are_off(bench: Bench) -> None:
+    """No STOP can be confirmed then: another one is no remedy."""
+    bench.station.stop("test")
+    outdated = "its file cannot be used: drives that it does not know may move"
+    bench.first.answer(Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}, outdated=outdated))
+    for number in (6.0, 4.0):
+        at_rest: dict[str, list[float | None]] = {f"{joint}.velocity": [0.0] for joint in JOINTS}
+        bench.station.take([states(number), telemetry([time.monotonic_ns()], at_rest)])
+        (one,) = bench.station.alarms.active
+        assert one.alarm.check == "use the hardware stop"
+        assert "are off" not in one.alarm.line
+        assert outdated in one.alarm.line
+        assert not one.alarm.what.startswith("STOP again")
+    assert bench.station.stopping.silent == ()
+    bench.station.stop("again")
+    bench.first.fail(NotConnected("there is no link"))
+    assert remedy(bench.station.robot, bench.station.stopping)[0] == "STOP again"
