@@ -228,7 +228,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
 ) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
-    station.stopping.held = held
+    station.stopping.described(held, None)
     now_ns = time.monotonic_ns()
     columns: dict[str, list[float | None]] = {f"{name}.state": [state] for name, state in states.items()}
     if columns:

@@ -337,7 +337,7 @@ def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, 
     bench.look_again([walking(10), looked()])
     bench.draw(window)
     said = [window.header._chips["status"].main_text, window.tabs.overview.now.activity.main.text()]
-    bench.station.stopping.held = True
+    bench.station.stopping.described(held=True, reason=None)
     window.refresh()
     after = [window.header._chips["status"].main_text, window.tabs.overview.now.activity.main.text()]
     assert all(one != other for one, other in zip(said, after, strict=True))

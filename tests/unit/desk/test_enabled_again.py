@@ -20,6 +20,7 @@ from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walk
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 OFF = Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False)
+HOUR_NS = 3_600_000_000_000  # so that rows are new however slow a test is
 HEARD = {"n": 9, "what": "stop", "reason": "fell", "who": "ann"}
 
 
@@ -33,8 +34,8 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 def states(number: float | None, **others: float | None) -> Event:
-    """A row, a second from now, with every drive in this state but these."""
-    at_ns = time.monotonic_ns() + 1_000_000_000
+    """A row, an hour from now, with every drive in this state but these."""
+    at_ns = time.monotonic_ns() + HOUR_NS
     columns = {f"{joint}.state": [others.get(joint, number)] for joint in JOINTS}
     return telemetry([at_ns], columns, at_ns)
 
@@ -85,6 +86,8 @@ def test_drives_that_are_enabled_while_a_stop_is_held_are_an_alarm_that_names_th
     station.take([states(4.0)])
     assert station.alarms.active[0].alarm.what == "all 6 drives"
     assert drives(station) == ("bad", "operation enabled")
+    station.stopping.described(held=True, reason="fell")
+    assert kinds(station) == [Kind.ENABLED_AGAIN], "it was held before"
     station.take([states(6.0)])
     assert kinds(station) == [Kind.STOPPED]
     assert undriven(station.robot, station.stopping) == HELD
@@ -154,6 +157,8 @@ def test_a_stop_again_is_sent_and_is_not_called_stopped_before_its_answer(bench:
     bench.station.stop("test")
     bench.first.answer(Stopped({**ALL.drives, "left_knee": "unconfirmed"}, held=True))
     bench.station.take([states(6.0, left_knee=4.0)])
+    assert kinds(bench.station) == [Kind.STILL_MOVING]
+    assert enabled_again(bench.station.robot, bench.station.stopping) == []
     bench.station.stop("again")
     assert kinds(bench.station) == []
     assert bench.station.mark == STOP_SENT
