@@ -211,7 +211,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
 @pytest.mark.parametrize(
     ("states", "held", "why", "word"),
     [
-        ({}, True, "a stop is held", "Stopped"),
+        (dict.fromkeys(JOINTS, 6.0), True, "a stop is held", "Stopped"),
         (dict.fromkeys(JOINTS, 5.0), False, "drives stop", "Stopping"),
         (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled", "Drives off"),
         ({"left_knee": 7.0}, False, "a drive is in fault", "In fault"),

@@ -299,12 +299,12 @@ def test_proof_of_a_stop_stands_at_each_joint(theme: Theme, bench: Bench) -> Non
     assert cells(model, 0)[STOP] == "no proof"
 
 
-def test_enabled_is_no_good_state_after_a_stop_that_is_not_confirmed(
+def test_enabled_is_no_good_state_after_a_stop_that_is_sent_or_not_confirmed(
     overview: Overview, theme: Theme, bench: Bench
 ) -> None:
     bench.station.take([walking(100), looked()])
     number = bench.station.stopping.sent()
-    for failed, colour in ((False, "good"), (True, "bad")):
+    for failed, colour in ((False, "warn"), (True, "bad")):
         if failed:
             bench.station.stopping.failed(number, "no link")
         overview.read_now()
