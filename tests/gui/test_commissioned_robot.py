@@ -41,7 +41,7 @@ def app(qt: QApplication, tmp_path: Path) -> Iterator[App]:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     settings = ServerSettings(prediction=PredictionSettings(enabled=False))
     with running(qt, settings, kept) as made:
-        made.window.tabs.setCurrentWidget(made.window.tabs.commission)
+        made.window.tabs.look_at_commissioning()
         yield made
 
 
