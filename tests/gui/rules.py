@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.views.frame.chip import Chip
+from server_gui.views.overview.now_line import Fact
 from server_gui.views.robots.others_bar import RobotChip
 from server_gui.views.robots.panel import RobotCard
 from server_gui.views.theme import Theme
@@ -127,8 +128,15 @@ def cut_titles(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[
 
 
 def cut_states(sight: Iterable[QWidget]) -> Iterator[str]:
-    """Every worst state of a robot, on its card or chip or in the header, of which letters have no room."""
+    """Every state in headline, chips and cards of which letters have no room."""
     for widget in sight:
+        if isinstance(widget, Fact):
+            labels = (widget.main, widget.detail)
+            yield from (f"{_path(widget)}: {one.shown}" for one in labels if not one.is_whole)
+        if isinstance(widget, Chip) and widget.accessibleName() != "robot":
+            for label in (widget._main, widget._detail):
+                if label.fontMetrics().horizontalAdvance(label.text()) > label.contentsRect().width():
+                    yield f"{_path(widget)}: {label.text()}"
         if isinstance(widget, Chip) and widget._words.shorter:
             label, word = widget._detail, widget._words.shorter
             wide = label.fontMetrics().horizontalAdvance(label.text())

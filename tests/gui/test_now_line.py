@@ -4,6 +4,7 @@ import itertools
 import time
 
 import pytest
+from PySide6.QtWidgets import QWidget
 
 from gateway.client import ConnectionState
 from gateway.wire.component import QualityInfo, Snapshot
@@ -19,6 +20,7 @@ from server_gui.views.predictions import doing
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
+from tests.gui.test_rules import _just_begun, _stop_lost, _walks
 from tests.support.desk import JOINTS, looked, telemetry, walking
 
 
@@ -66,6 +68,30 @@ def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, ot
             assert now.keep.isVisible() is is_offered
     assert now.trial.main.shown.startswith("On trial: step length (gait) 400 → 420 mm")
     destroy(now)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_the_words_of_a_state_are_whole_in_one_line_too(theme: Theme, bench: Bench, scale: float) -> None:
+    """It said `STOP NO…NFIRMED` beside `Activity not known`."""
+    theme.set(scale=scale)
+    around = QWidget()  # else its own layout keeps it from being narrow
+    now = NowLine(bench.desk, theme)
+    now.setParent(around)
+    now.be_flat(True)
+    around.show()
+    cut = []
+    for state, width in itertools.product((_just_begun, _walks, _stop_lost), range(300, 1060, 20)):
+        if width == 300:
+            bench.desk.select(bench.desk.stations[0])
+            state(bench)
+        now.resize(round(width * scale), 40)
+        now.refresh()
+        settle()
+        for fact in (now.drives, now.activity):
+            cut += [(width, one.shown) for one in (fact.main, fact.detail) if not one.is_whole]
+    assert not cut
+    assert "enabled" in now.drives.detail.shown, "where there is room"
+    destroy(around)
 
 
 def test_a_held_stop_says_since_when_and_that_every_drive_has_confirmed_it(

@@ -64,6 +64,16 @@ def _unconfirmed(bench: Bench) -> None:
     bench.first.fail(NotConnected(LOST))
 
 
+def _stop_lost(bench: Bench) -> None:
+    """STOP NOT CONFIRMED: nothing comes that would say whether it moves still."""
+    _unconfirmed(bench)
+    bench.look_again([LinkChanged(ConnectionState.WAITING, LOST, time.monotonic_ns())])
+
+
+def _just_begun(bench: Bench) -> None:
+    bench.look_again([walking(10), looked()])
+
+
 def _two_robots(bench: Bench) -> None:
     busy(bench)
     live(bench, STRIDES)
@@ -80,14 +90,14 @@ def _runtime(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 UNKNOWN = (_nothing_came, _never_reached, _link_lost, _stale)
-KNOWN = (_walks, _fault, _stopped, _unconfirmed, _two_robots)
+KNOWN = (_just_begun, _walks, _fault, _stopped, _unconfirmed, _stop_lost, _two_robots)
 SIZES = ((1024, 700, 1.0), (1024, 700, 2.0), (1366, 768, 1.5))
 # Of what this program does itself it may know that it is well.
 OWN = ("link", "control", "Store", "recording")
 
 
 @pytest.mark.parametrize("state", [*UNKNOWN, *KNOWN])
-@pytest.mark.parametrize(("width", "height", "scale"), SIZES[:2])
+@pytest.mark.parametrize(("width", "height", "scale"), SIZES)
 def test_every_view_in_every_state(
     request: pytest.FixtureRequest,
     bench: Bench,

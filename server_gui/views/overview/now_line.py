@@ -1,5 +1,6 @@
 """The overview's first line: drives, activity with how far to believe it, and what is on trial."""
 
+import itertools
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -14,7 +15,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, is_judged, so_far, why_no_ab, wordings
-from server_gui.views.marks import Mark, drives_mark, enabled_text, time_of_day
+from server_gui.views.marks import SHORTER, Mark, drives_mark, enabled_text, time_of_day
 from server_gui.views.predictions import AS_KNOWN, STOPPED, activity, is_last_held, no_data
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_primary
@@ -23,6 +24,7 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
+BESIDE: Final = 8  # between the words and the detail of one line
 ON_TRIAL: Final = Mark("half", "warn", "on trial")
 
 
@@ -39,6 +41,7 @@ class Fact(QWidget):
             ShrinkingLabel("title"),
             ShrinkingLabel("dim"),
         )
+        self._details: tuple[str, ...] = ("",)
         self._words = words = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         words.setSpacing(0)
         words.addWidget(self.main)
@@ -55,7 +58,8 @@ class Fact(QWidget):
         """Say this; of each the fullest wording first."""
         self._icon.show_mark(mark)
         self.main.say(*main)
-        self.detail.say(*detail)
+        self._details = detail
+        self._say_detail()
         self.setAccessibleDescription(f"{main[0]}, {detail[0]}")
         set_tip(self, "\n".join(filter(None, (main[0], detail[0], tip))))
 
@@ -64,12 +68,25 @@ class Fact(QWidget):
         way = QBoxLayout.Direction.LeftToRight if is_flat else QBoxLayout.Direction.TopToBottom
         if way is not self._words.direction():
             self._words.setDirection(way)
-            self._words.setSpacing(8 if is_flat else 0)
+            self._words.setSpacing(BESIDE if is_flat else 0)
+            self._say_detail()
+
+    @property
+    def widths(self) -> tuple[int, int, int]:
+        """How wide its one line is (pixels): with its fewest words, with all, with the least beside them."""
+        icon = self.wide - self.main.sizeHint().width()
+        least = min(map(self.detail.fontMetrics().horizontalAdvance, self._details))
+        return icon + self.main.minimumSizeHint().width(), self.wide, self.wide + BESIDE + least
 
     @property
     def wide(self) -> int:
         """How wide it is with its first line whole (pixels)."""
         return self._icon.sizeHint().width() + self.row.spacing() + self.main.sizeHint().width()
+
+    def _say_detail(self) -> None:
+        """Say it; in one line nothing at all where its words alone have room."""
+        is_flat = self._words.direction() is QBoxLayout.Direction.LeftToRight
+        self.detail.say(*self._details, *([""] if is_flat else []))
 
     def _restyle(self) -> None:
         self.main.setFont(self._theme.text_font(1.15, bold=True))
@@ -180,6 +197,20 @@ class NowLine(QFrame):
         columns = 3 if is_beside else min(max(self.width() // a_fact, 1), 2)
         self._arrange(columns, on_trial=on_trial)
         self._grid.setColumnMinimumWidth(2, self.trial.wide if columns > 2 else 0)
+        self._share(columns)
+
+    def _share(self, columns: int) -> None:
+        """Give both facts of a line room for their words first, then for what stands beside these."""
+        facts, least = (self.drives, self.activity), [0, 0]
+        if self.is_flat and columns > 1:
+            taken = (columns - 1) * self._grid.horizontalSpacing() + self._grid.columnMinimumWidth(2)
+            room = self._grid.contentsRect().width() - taken
+            least = [fact.widths[0] for fact in facts]
+            for step, place in itertools.product((1, 2), (0, 1)):
+                wider = facts[place].widths[step]
+                least[place] = wider if least[1 - place] + wider <= room else least[place]
+        for column, wide in enumerate(least):
+            self._grid.setColumnMinimumWidth(column, wide)
 
     def _arrange(self, columns: int, *, on_trial: bool) -> None:
         if (columns, on_trial) == self._placed:
@@ -216,7 +247,8 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
-    return mark, (mark.word.capitalize(),), (*_warmest(station, units, count), count)
+    words = (mark.word.capitalize(), SHORTER.get(mark.word, mark.word).capitalize())
+    return mark, tuple(dict.fromkeys(words)), (*_warmest(station, units, count), count)
 
 
 def _warmest(station: Station, units: Units, count: str) -> tuple[str, ...]:
