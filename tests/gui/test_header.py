@@ -13,12 +13,20 @@ from server_gui.views.frame.recording_chip import _words
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, destroy
-from tests.gui.test_rules import _fault, _link_lost, _never_reached, _stopped, _unconfirmed, _walks
+from tests.gui.test_rules import (
+    _fault,
+    _link_lost,
+    _never_reached,
+    _stop_lost,
+    _stopped,
+    _unconfirmed,
+    _walks,
+)
 from tests.support.desk import JOINTS, telemetry
 
 LEAST = 1024  # wide, where every number has room
 WIDTHS = (*range(320, 1000, 120), LEAST, 1366, 1920)
-STATES = (_walks, _link_lost, _never_reached, _fault, _stopped, _unconfirmed)
+STATES = (_walks, _link_lost, _never_reached, _fault, _stopped, _unconfirmed, _stop_lost)
 
 
 @pytest.fixture
@@ -73,6 +81,24 @@ def test_age_and_recording_are_in_sight_beside_stop_however_large_the_text_is(
     assert {"robot", "drives", "link", "recording"} <= shown.keys(), shown
     assert shown["recording"] in ("Not recording", "REC off")
     assert not rules.halved_numbers(header)
+
+
+@pytest.mark.parametrize(("width", "scale"), [(1024, 1.0), (1024, 1.5), (1024, 2.0), (1366, 1.5)])
+@pytest.mark.parametrize("state", [_unconfirmed, _stop_lost])
+def test_age_is_in_sight_beside_a_stop_that_is_not_confirmed(
+    bench: Bench, theme: Theme, header: Header, state: Callable[[Bench], None], width: int, scale: float
+) -> None:
+    """There was none at all: the robot's chip had the room, and most of it empty."""
+    theme.set(scale=scale)
+    header.be_short(width < theme.px(1200))
+    header.resize(width, header.height())
+    _told(bench, state)
+    header.refresh()
+    link, robot = header._chips["link"], header._chips["robot"]
+    assert link.isVisible()
+    assert "old" in f"{link.main_text} {link.detail_text}"
+    words = robot._detail.fontMetrics().horizontalAdvance(robot.detail_text)
+    assert not robot.isVisible() or words > robot.width() / 2, "no wider than its words need"
 
 
 def test_a_name_is_whole_as_long_as_others_can_say_less(bench: Bench, theme: Theme, header: Header) -> None:
@@ -132,7 +158,7 @@ def test_it_is_always_said_which_robot_is_looked_at_and_how_it_is(
         header.refresh()
         QApplication.processEvents()
         chip = header._chips["robot"]
-        if state is _unconfirmed and not chip.isVisible():  # then that has the room, and STOP has the name
+        if header.outcome_text and not chip.isVisible():  # the age has the room, and STOP has the name
             assert "".join(header.stop.lines).replace(" ", "") == name
             continue
         assert chip.isVisible(), state.__name__

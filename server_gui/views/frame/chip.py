@@ -94,6 +94,14 @@ class Chip(QFrame):
         bold = QFontMetrics(self._theme.text_font(bold=True))
         return max(self.needs(), bold.horizontalAdvance(self._words.main) + self._around())
 
+    def more(self, room: int) -> int:
+        """Return how much wider it is, by at most so much, with as many parts of its detail as that has."""
+        plain, needs = QFontMetrics(self._theme.text_font()), self.needs()
+        parts = self._words.parts
+        texts = (" · ".join(parts[:count]) for count in range(len(parts), 0, -1))
+        wider = (plain.horizontalAdvance(text) + self._around() - needs for text in texts)
+        return max(next((wide for wide in wider if wide <= room), 0), 0)
+
     def say(self, words: Words) -> None:
         """Show this."""
         self._words = words

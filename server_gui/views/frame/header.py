@@ -32,7 +32,8 @@ RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is
 # Brief, and then left out, in this order where there is less room; alarms stand below the header.
 BRIEF: Final = ("recording", "link", "drives")
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
-SPARE_AFTER_STOP: Final = ("status", "recording", "drives", "link", "robot")  # its result tells of the drives
+# Its result tells of the drives, and STOP has the robot's name: the age of what is seen goes last.
+SPARE_AFTER_STOP: Final = ("status", "recording", "drives", "robot", "link")
 LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
 
@@ -128,7 +129,7 @@ class Header(QWidget):
         for name, chip in self._chips.items():
             chip.setVisible(name in needs)
             chip.setMinimumWidth(needs.get(name, 0))
-            self._row.setStretchFactor(chip, chip.wants if name in needs else 0)
+            self._row.setStretchFactor(chip, chip.wants if name in needs and name != "robot" else 0)
         self._outcome.setVisible(has_outcome)
         self._outcome.setMinimumWidth(self._outcome.needs() if has_outcome else 0)
         self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
@@ -152,8 +153,13 @@ class Header(QWidget):
                 needs[name] = chips[name].needs(brief=True)
         if "robot" in needs and not has_room():
             needs["robot"] = min(needs["robot"], max(chips["robot"].least, self._theme.px(LEAST_NAME)))
+        spared = {}
         for name in SPARE_AFTER_STOP if self._has_outcome else SPARE:
             if name in needs and not has_room():
+                spared[name] = needs.pop(name)
+        for name in reversed(spared):  # a wider one than needed may have gone after it
+            needs[name] = spared[name]
+            if not has_room():
                 del needs[name]
         for name in ("robot", *BRIEF):  # as wide again as it may be without what is left out
             least = needs.get(name, 0)
@@ -165,6 +171,7 @@ class Header(QWidget):
                     needs[name] = least
         if "robot" in needs:
             self._whole_name(needs, brief, room)
+            needs["robot"] += chips["robot"].more((room - sum(needs.values()) - len(needs) * spacing) // 2)
         for name in BRIEF:
             chips[name].be_brief(name in brief)
         return needs
