@@ -68,6 +68,7 @@ class PredictionRow:
     tip: str = ""
     brief: str = ""  # all of it where there is the least room
     is_doubtful: bool = False  # the model says itself that it is not to be relied on
+    least: str = ""  # of the detail, where it has no room: never less
     is_unchecked: bool = False  # nobody has compared what the model says with what was so
 
     @property
@@ -100,7 +101,8 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL and unseen:
-        return PredictionRow(Mark("ring", "old", UNSEEN), "Not judged", unseen, unseen, _tip(shown))
+        mark = Mark("ring", "old", UNSEEN)
+        return PredictionRow(mark, NOT_JUDGED, unseen, unseen, _tip(shown), least="nothing comes")
     if prediction.label == ABNORMAL:
         novelty = f"novelty {prediction.novelty:.1f}"
         return PredictionRow(
@@ -124,7 +126,8 @@ def _modest(row: PredictionRow, word: str) -> PredictionRow:
 
 def unjudged(why: str) -> PredictionRow:
     """Return the row of a task that is not judged, and the reason."""
-    return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
+    least = "drives not known" if "drives not known" in why else why
+    return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why, least=least)
 
 
 def status(station: Station) -> PredictionRow | None:

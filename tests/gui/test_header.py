@@ -22,7 +22,7 @@ from tests.gui.test_rules import (
     _unconfirmed,
     _walks,
 )
-from tests.support.desk import JOINTS, telemetry
+from tests.support.desk import JOINTS, looked, telemetry
 
 LEAST = 1024  # wide, where every number has room
 WIDTHS = (*range(320, 1000, 120), LEAST, 1366, 1920)
@@ -122,6 +122,33 @@ def test_a_recording_of_which_nothing_is_known_is_not_said_to_be_off(header: Hea
         header.recording.be_brief(brief)
         header.recording.say(_words(bench.desk.recording, said, None))
         assert header.recording.main_text == text
+
+
+def test_a_chip_says_why_it_is_not_recorded_or_not_judged(header: Header, bench: Bench) -> None:
+    """There was nothing below `NOT RECORDING`, `Recording` and `Not judged`."""
+    header.resize(1366, header.height())
+    now_ns = time.monotonic_ns()
+    states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    states["left_knee.state"] = [None]
+    bench.look_again([looked(), telemetry([now_ns], states, now_ns)])
+    header.refresh()
+    status = header._chips["status"]
+    assert status.main_text == "Not judged"
+    assert "drives not known" in status.detail_text
+    bad = Said(Tone.BAD, "NOT RECORDING", "the spool cannot be read", reason="its folder is missing")
+    coming = Said(Tone.WARNING, "Recording · nothing comes · spool 1.8 MiB · all uploaded", brief="REC")
+    for said, why in ((bad, bad.reason), (coming, "nothing comes")):
+        words = _words(bench.desk.recording, said, None)
+        chip = header.recording
+        for is_brief in (False, True):
+            chip.be_brief(is_brief)
+            chip.say(words)
+            chip.resize(chip.wants, chip.height())
+            assert chip.detail_text.startswith(why)
+    narrow = chip.needs(brief=True)
+    chip.resize(narrow, chip.height())
+    assert chip.main_text == "REC"
+    assert "…" not in chip.detail_text
 
 
 def _told(bench: Bench, state: Callable[[Bench], None]) -> None:

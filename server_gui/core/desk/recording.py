@@ -25,7 +25,12 @@ from server_gui.core.threads.supervision import Trouble
 LOOK_NS: Final = 1_000_000_000  # between looks
 SOON: Final = "this window records as soon as it can"
 WHO: Final = "recording"  # what the news name instead of a robot
-STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
+SPOOL: Final = "the spool has trouble"
+STOPPED: Final = {AlarmKind.DISK_FULL: "the disk is full", AlarmKind.SPOOL_FAILED: SPOOL}
+NOBODY: Final = "nobody records"
+SHOW_ONLY: Final = "started to show only"
+THREAD: Final = "a thread has trouble"
+NOT_FOLLOWED: Final = "it is not followed"
 NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
 NOTHING: Final = "nothing comes"
 LATE_WHY: Final = "this computer is busy"
@@ -95,7 +100,7 @@ class Said:
     text: str
     detail: str = ""
     brief: str = "NOT REC"
-    reason: str = ""  # of a warning, in a few words
+    reason: str = ""  # why it is not good, in a few words
 
 
 class Recording:
@@ -293,39 +298,53 @@ class Recording:
         """
         report = self.report
         if self._keeper is None:
-            return Said(Tone.OFF, "Not recording", self.why, "REC off")
+            return Said(Tone.OFF, "Not recording", self.why, "REC off", self._why_not(self.why))
         threads = self._threads.get(self.by, ())
         ended = [known for known in threads if known.thread in NEEDED and not known.works]
         if ended and all(known.is_late for known in ended):
-            return Said(Tone.WARNING, LATE.partition(":")[0].capitalize(), LATE, "REC late")
+            return Said(Tone.WARNING, LATE.partition(":")[0].capitalize(), LATE, "REC late", LATE_WHY)
         if ended:
-            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(known.text for known in ended))
-        if self.problem is not None:
-            return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
-        if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
             return Said(
-                Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known", "REC ?"
+                Tone.BAD, "RECORDING HAS STOPPED", "; ".join(known.text for known in ended), reason=THREAD
             )
+        if self.problem is not None:
+            detail = f"{self.why or self.problem}; {SOON}"
+            return Said(Tone.BAD, "NOT RECORDING", detail, reason=self._why_not(detail))
+        if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
+            unknown = "whether anything is recorded now is not known"
+            return Said(Tone.BAD, "RECORDING: NO ANSWER", unknown, "REC ?", "not known whether")
         if report is None:
-            return Said(Tone.OFF, "Recording: not known yet", self.why, "REC ?")
-        stopped = [alarm.text for alarm in report.recorder.alarms if alarm.kind in STOPPED]
+            return Said(Tone.OFF, "Recording: not known yet", self.why, "REC ?", "waits for an answer")
+        stopped = [alarm for alarm in report.recorder.alarms if alarm.kind in STOPPED]
         if stopped:
-            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(stopped))
+            texts = "; ".join(alarm.text for alarm in stopped)
+            return Said(Tone.BAD, "RECORDING HAS STOPPED", texts, reason=STOPPED[stopped[0].kind])
         if report.is_paused:
             return Said(
                 Tone.OFF,
                 " · ".join(filter(None, ("Not recording: stopped", self._stopped))),
                 "somebody has stopped it in this window",
                 "REC off",
+                "" if self._stopped else "stopped here",
             )
         addresses = {link.address for link in report.robots.values()}
         if self.by is By.OTHER and address is not None and address not in addresses:
-            return Said(Tone.WARNING, "This robot is NOT recorded", _not_followed(report))
+            return Said(
+                Tone.WARNING, "This robot is NOT recorded", _not_followed(report), reason=NOT_FOLLOWED
+            )
         return self._going_on(report, address, comes=is_live or self.by is not By.WINDOW)
+
+    def _why_not(self, detail: str) -> str:
+        """Return in a few words why nothing is recorded, told by all of them."""
+        if NO_FOLDER in detail:
+            return "its folder is missing"
+        if self._keeper is None:
+            return SHOW_ONLY if SHOW_ONLY in detail else NOBODY
+        return NOBODY if self.by is By.OTHER else "the recorder failed"
 
     def _going_on(self, report: CollectorReport, address: str | None, *, comes: bool) -> Said:
         if address is None and not comes:
-            return Said(Tone.OFF, NO_ROBOT, f"spool {report.spool}", "REC off")
+            return Said(Tone.OFF, NO_ROBOT, f"spool {report.spool}", "REC off", "none is followed")
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
@@ -353,12 +372,12 @@ class Recording:
         """Return why it is a warning, in a few words; "" where what is said of the rows tells that."""
         reach, recorder = self.reach, report.recorder
         known = (
-            (bool(recorder.alarms), "the spool has trouble"),
+            (bool(recorder.alarms), SPOOL),
             (reach.problem is not None, NOT_REACHED),
             (reach.list_problem is not None, "store's list damaged"),
             (reach.upload_problem is not None, "an upload failed"),
             (bool(report.uploader.lost or report.uploader.ahead), "the spool has losses"),
-            (any(self._threads.values()), "a thread has trouble"),
+            (any(self._threads.values()), THREAD),
         )
         return next((text for is_so, text in known if is_so), "")
 

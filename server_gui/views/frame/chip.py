@@ -27,6 +27,7 @@ class Words:
     tip: str = ""
     shorter: str = ""  # the first part, where it has no room: never less
     brief: tuple[str, ...] = ()  # main and parts, where it would have no room otherwise
+    aside: str = ""  # below a brief main, where there is room for it
 
 
 class Chip(QFrame):
@@ -85,7 +86,8 @@ class Chip(QFrame):
         """How wide it is with everything that it has to say now."""
         bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
         main, *parts = self._said(brief=self._is_brief)
-        words = max(bold.horizontalAdvance(main), plain.horizontalAdvance(" · ".join(parts)))
+        texts = (" · ".join(parts), self._words.aside if self._is_brief else "")
+        words = max(bold.horizontalAdvance(main), *map(plain.horizontalAdvance, texts))
         return max(self.needs(brief=self._is_brief), words + self._around(brief=self._is_brief))
 
     @property
@@ -132,6 +134,7 @@ class Chip(QFrame):
         main, *parts = self._said(brief=is_brief)
         texts = [" · ".join(parts[:count]) for count in range(len(parts), 0, -1)]
         texts += filter(None, (self._words.shorter,))
+        texts += [self._words.aside, ""] if is_brief and not texts else []
         fits = (text for text in texts if plain.horizontalAdvance(text) <= room)
         last = texts[-1] if texts and not any(sign.isdigit() for sign in texts[-1]) else ""  # a name at most
         set_text(self._main, main)

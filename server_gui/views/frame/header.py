@@ -272,7 +272,8 @@ def _status(station: Station) -> Words:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         parts = ("doubtful", "predicted") if line.is_doubtful else parts
         parts = ("not checked", "predicted") if line.is_unchecked else parts
-        return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
+        tip = f"{line.text}\n{line.detail}"
+        return Words(line.mark, line.text, tuple(filter(None, parts)), tip, line.least)
     gait, problem, seen = (
         station.processing.derived().gait,
         station.predictions.problem,

@@ -104,12 +104,14 @@ def ask_name(parent: QWidget, begin: Callable[[str, str], None], worn_by: str = 
 
 def _words(recording: Recording, said: Said, address: str | None) -> Words:
     link, mark = recording.link(address), TONES[said.tone]
-    first, _, rest = said.text.partition(" · ")
+    first, *rest = said.text.split(" · ")
     since_s = None if link is None else link.recording_since_utc_s
     tip = "\n".join(filter(None, (said.text, said.detail)))
-    if said.tone in (Tone.BAD, Tone.OFF) or since_s is None:
-        return Words(mark, first, (rest,) if rest else (), tip, brief=(said.brief,))
+    is_off = said.tone in (Tone.BAD, Tone.OFF)
+    said_of = tuple(filter(None, (*rest,) if is_off and rest else (said.reason, *rest)))
+    if is_off or since_s is None:
+        aside = said.reason or next(iter(said_of), "")
+        return Words(mark, first, said_of, tip, brief=(said.brief,), aside=aside)
     clock = clock_text(max(0.0, time.time() - since_s))
-    said_of = tuple(filter(None, (said.reason, *rest.split(" · "))))
     parts = (said_of[0], link.notes) if link is not None and link.notes else said_of
     return Words(mark, f"{first} {clock}", parts, tip, brief=(f"{said.brief} {clock}", *parts[:1]))

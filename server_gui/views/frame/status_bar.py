@@ -1,6 +1,7 @@
 """The last line: the robot's computer and bus, who uses most of it, what is recorded, what STOP is not."""
 
 import collections
+import re
 import time
 from typing import Final
 
@@ -32,16 +33,17 @@ FRAMES_HINT: Final = (
     "Frames that this window draws a second; while this computer is busy, what is shown is late"
 )
 FULL: Final = ("▲ this computer is busy", "▲ busy")
+LEAST_OF_STOP: Final = "F12: not an emergency stop"  # what it is not goes last of all
 STOP: Final = (
     "STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop",
     "F12: software stop, not an emergency stop",
-    "F12: software stop",
+    LEAST_OF_STOP,
 )
 STOPS: Final = (  # while a robot is being commissioned
     "F12 or Ctrl+Space stops {whom} · software, not a safety-rated emergency stop",
     "F12 stops {whom}: software, not an emergency stop",
     "F12: software stop, not an emergency stop",
-    "F12: software stop",
+    LEAST_OF_STOP,
 )
 
 
@@ -100,11 +102,11 @@ class StatusBar(QStatusBar):
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
-        self.computer.say(*(("no robot", "") if station is None else _computer(station)))
+        self.computer.say(*(("no robot", "") if station is None else (*_computer(station), "")))
         mark, words = (LEVELS[BusHealthLevel.UNKNOWN], ("",)) if station is None else _bus(station)
         self._bus_icon.show_mark(mark)
         self._bus_icon.setVisible(station is not None)
-        self.bus.say(*words)
+        self.bus.say(*dict.fromkeys((*words, re.split("[,:]", words[-1])[0])))
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
         known, is_full = self._rate(), station is not None and station.is_full()
@@ -142,6 +144,10 @@ class StatusBar(QStatusBar):
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
         short = " · ".join(filter(None, (said.text.partition(" · ")[0], said.reason)))
         wordings: tuple[str, ...] = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        if said.tone is Tone.BAD:  # as before, but never without the reason
+            wordings = (wordings[0], short, f"{said.brief} · {said.reason}")
+        if said.tone in (Tone.GOOD, Tone.OFF):
+            wordings = (*wordings, said.brief)
         if NOTHING in said.text.split(" · "):  # why it is no good, before that it goes on
             brief = " · ".join(filter(None, (NOTHING, said.reason)))
             wordings = (*wordings[:2], f"{short}: {NOTHING}", brief)
