@@ -46,7 +46,7 @@ def old_text(station: Station) -> tuple[str, ...]:
     age_s = station.robot.age_s()
     if age_s is None:
         return ("no data yet",)
-    return f"STALE, {age_text(age_s)} old", f"{age_text(age_s)} old", "STALE"
+    return f"STALE, {age_text(age_s)} old", f"{age_text(age_s)} old"
 
 
 def draw(painter: QPainter, mark: Mark, colour: QColor, box: QRectF) -> None:

@@ -236,6 +236,22 @@ def test_a_plot_without_data_says_so_and_has_no_numbers(theme: Theme, bench: Ben
     destroy(made)
 
 
+@pytest.mark.parametrize("width", range(540, 1101, 80))
+def test_plots_beside_each_other_say_their_age_alike(
+    overview: Overview, bench: Bench, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    """One said its age, the next `STALE` without it, the third both."""
+    bench.station.take([walking(300)])
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 0)
+    overview.resize(width, 800)
+    draw(overview)
+    draw(overview)
+    notes = [plot.note_label.shown.rpartition(", ")[0::2] for plot in overview._plots]
+    assert len({stale for stale, _ in notes}) == 1, notes
+    assert all(age.endswith(" old") for _, age in notes), notes
+    assert all(plot.note_label.is_whole for plot in overview._plots)
+
+
 @pytest.mark.parametrize("height", [30.0, 60.0, 200.0])
 def test_numbers_beside_a_plot_never_stand_on_each_other(qt: QApplication, height: float) -> None:
     axis = ValueAxis()

@@ -119,6 +119,7 @@ class Overview(QWidget):
         self._shares = {side: ShrinkingLabel("dim") for side in SIDES}
         self._pressure = self._pressure_card()
         self._plots = [self._plot(kind) for kind in PLOTS]
+        self._plots[0].note_label.speak_alike(*(plot.note_label for plot in self._plots[1:]))
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
         self._table = JointTable(self._model, theme)
         self._joints.body.addWidget(self._table, 1)

@@ -133,7 +133,9 @@ class Resources(QWidget):
         old = age_s is not None and age_s > OLD_S
         count = self.table.processes.rowCount()
         known = "no data yet" if age_s is None else f"{count} processes"
-        self._processes.set_note(*(f"STALE, {age_text(age_s)} old", "STALE") if old else (known,))
+        self._processes.set_note(
+            *(f"STALE, {age_text(age_s)} old", f"{age_text(age_s)} old") if old else (known,)
+        )
         self.table.setEnabled(not old)
 
     def _watch(self) -> None:

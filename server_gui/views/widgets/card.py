@@ -41,6 +41,10 @@ class Card(QFrame):
     def note(self) -> str:
         return self._note.text()
 
+    @property
+    def note_label(self) -> ShrinkingLabel:
+        return self._note
+
     def set_note(self, *wordings: str) -> None:
         """Set the note at the right of the title: what is said in full, and where there is less room."""
         self._note.say(*wordings)
