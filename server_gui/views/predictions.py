@@ -69,6 +69,7 @@ class PredictionRow:
     brief: str = ""  # all of it where there is the least room
     is_doubtful: bool = False  # the model says itself that it is not to be relied on
     least: str = ""  # of the detail, where it has no room: never less
+    is_sure: bool = True  # else its percentage is said beside its detail alone
     is_unchecked: bool = False  # nobody has compared what the model says with what was so
 
     @property
@@ -79,8 +80,9 @@ class PredictionRow:
     @property
     def wordings(self) -> tuple[str, ...]:
         """As one line, the fullest first."""
-        details = (self.detail, self.short, "")
-        said = [" · ".join(filter(None, (self.text, one))) for one in details]
+        alone = [(self.text, "")] if self.is_sure else [(self.brief, self.short)]
+        pairs = ((self.text, self.detail), (self.text, self.short), *alone)
+        said = [" · ".join(filter(None, pair)) for pair in pairs]
         return tuple(dict.fromkeys((*said, self.brief or self.text)))
 
 
@@ -113,7 +115,16 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     shape = ("square", "bad") if falls else ("diamond", "accent")
     is_doubtful = worth.worth is Worth.DOUBTFUL  # then a percentage would look sure
     text = f"{word}?" if is_doubtful else f"{word} {100 * prediction.probability:.0f} %"
-    row = PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
+    is_sure = worth.worth is Worth.CHECKED
+    row = PredictionRow(
+        Mark(*shape, prediction.label),
+        text,
+        *details,
+        _tip(shown),
+        brief="" if is_sure else text if is_doubtful else word,
+        is_doubtful=is_doubtful,
+        is_sure=is_sure,
+    )
     is_unchecked = worth.worth is Worth.UNCHECKED and prediction.task == ACTIVITY
     return _modest(row, word) if is_unchecked and not isinstance(shown, Recalled) else row
 
@@ -395,8 +406,15 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
     """Return the line with the agreement of steps and model; the ring has the numbers."""
     if unseen := blind(station):
         return replace(
-            line, mark=Mark("ring", "old", UNSEEN), text=UNSEEN, detail=unseen, short=unseen, brief=""
+            line,
+            mark=Mark("ring", "old", UNSEEN),
+            text=UNSEEN,
+            detail=unseen,
+            short=unseen,
+            brief="",
+            is_sure=True,
         )
+    line = replace(line, brief="", is_sure=True)  # what follows has no percentage of the model
     modelled, steps = model_phases(station), step_phases(station)
     pairs = [(steps[leg], modelled[leg]) for leg in Leg]
     differences = [apart(one.percent, other.percent) for one, other in pairs if one and other]

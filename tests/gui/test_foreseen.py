@@ -110,6 +110,16 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     assert window.overview._ring._word == "Walk", "94 % looks like how often it is right"
 
 
+@pytest.mark.parametrize("label", ["steady", "fall"])
+def test_no_percentage_stands_without_how_far_to_believe_it(station: Station, label: str) -> None:
+    """On a narrow card it said `Balance: Steady 100 %` alone."""
+    station.take_prediction(predicted(label, {label: 0.97, "slip": 0.03}, task="falling"))
+    balance = next(line for line in lines(station) if line.text.startswith("Balance: "))
+    assert balance.wordings[0].startswith(f"Balance: {label.capitalize()} 97 % · not yet checked")
+    assert all("not yet checked" in said for said in balance.wordings if "%" in said)
+    assert balance.wordings[-1] == f"Balance: {label.capitalize()}"
+
+
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {}, seconds=312, recordings=3)
     station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
