@@ -31,7 +31,9 @@ def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, sc
     destroy(ring)
 
 
-@pytest.mark.parametrize(("scale", "side"), [(1.0, 90), (1.5, 90), (1.0, 240), (2.0, 160)])
+@pytest.mark.parametrize(
+    ("scale", "side"), [(1.0, 90), (1.5, 90), (1.0, 130), (1.0, 180), (1.0, 240), (2.0, 160)]
+)
 def test_words_in_the_ring_touch_it_nowhere(
     theme: Theme, monkeypatch: pytest.MonkeyPatch, scale: float, side: int
 ) -> None:
@@ -75,4 +77,21 @@ def test_letters_in_the_ring_are_read_and_as_large_whatever_phase_it_is(theme: T
         sizes.append(ring.letters)
     assert sizes[0] == sizes[1]
     assert min(sizes[0]) >= theme.text_font(0.75).pointSizeF()
+    destroy(ring)
+
+
+def test_letters_grow_with_the_ring_up_to_a_size(theme: Theme) -> None:
+    """In a ring twice as large as the least they were as small as there."""
+    ring, text = GaitRing(theme), theme.text_font().pointSizeF()
+    walks: Phases = dict.fromkeys(Leg, LegPhase(27.0, "mid-stance"))
+    nothing: Phases = dict.fromkeys(Leg)
+    for known, word in ((walks, "Walk"), (nothing, "Activity not known")):
+        sizes = {}
+        for side in (90, 130, 180):
+            ring.setFixedSize(theme.px(side), theme.px(side))
+            ring.show_phases(known, known, word, "", live=True)
+            ring.grab()
+            sizes[side] = min(ring.letters) / text
+        assert sizes[90] < sizes[130] <= sizes[180], word
+        assert 1.1 < sizes[180] < 1.4, word
     destroy(ring)

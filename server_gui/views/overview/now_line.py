@@ -247,8 +247,8 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
     if station.stopping.held and mark.colour == "dim":  # off, and held so
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
-    words = (mark.word.capitalize(), SHORTER.get(mark.word, mark.word).capitalize())
-    return mark, tuple(dict.fromkeys(words)), (*_warmest(station, units, count), count)
+    said = dict.fromkeys((mark.word.capitalize(), SHORTER.get(mark.word, mark.word).capitalize()))
+    return mark, tuple(said), (*_warmest(station, units, count), count)
 
 
 def _warmest(station: Station, units: Units, count: str) -> tuple[str, ...]:

@@ -19,7 +19,9 @@ from server_gui.views.theme import Theme
 GAP_DEG: Final = 2.4  # between two phases
 SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
 LEAST: Final = 90  # wide and high, at text of 100 %: three lines have room in its middle
-READ: Final = 0.85  # of it, for a phase's name
+READ: Final = 0.85  # of it, in the smallest ring
+MOST_READ: Final = 1.3  # likewise, in a larger one with as few lines
+MIDDLE: Final = 0.57  # of the widget, wide: what the rings leave
 FREE: Final = 1.08  # of the box in the middle: the circle that touches no ring
 MOST, MOST_SHORT = 5, 3  # lines; above and below three small ones the circle has no room
 LETTERS: Final = 0.7  # of a line, high
@@ -189,11 +191,12 @@ class GaitRing(QWidget):
         """
         size = min(1.6, box.width() / self._theme.px(140))
         is_short = size < SMALL
+        read = min(max(READ, READ * box.width() / (self._theme.px(LEAST) * MIDDLE)), MOST_READ)
         line = max(
             box.height() / 5.2,
-            QFontMetricsF(self._theme.text_font(READ if is_short else 0.8 * size)).height(),
+            QFontMetricsF(self._theme.text_font(read if is_short else 0.8 * size)).height(),
         )
-        plain, bold = (READ, READ) if is_short else (max(0.9 * size, SMALL), 1.5 * size)
+        plain, bold = (read, read) if is_short else (max(1.2 * size, READ), 1.5 * size)
         colour = "text" if self._live else "old"
         legs: list[Row] = []
         for leg in Leg:
@@ -201,21 +204,30 @@ class GaitRing(QWidget):
                 said = self._phase_text(leg, now, box.width(), is_short=is_short or is_brief)
                 legs.append((said, leg.value if self._live else "old", plain, False))
         most = max(1, min(int(box.height() / line), MOST_SHORT if is_short else MOST))
-        words: list[Row] = [(one, colour, bold, True) for one in self._word_lines(box, most - len(legs))]
+        lines = self._word_lines(box, most - len(legs), SMALL if legs else read)
+        words: list[Row] = [(one, colour, bold, True) for one in lines]
         if is_short:
             return [*legs[:1], *words, *legs[1:]], line
-        below: list[Row] = [(self._below, "dim", max(0.95 * size, SMALL), False)] if self._below else []
+        below: list[Row] = [(self._below, "dim", max(0.95 * size, READ), False)] if self._below else []
         return [*words, *below, *legs][:most], line
 
-    def _word_lines(self, box: QRectF, most: int) -> list[str]:
-        """Return the word in one line or several.
+    def _word_lines(self, box: QRectF, most: int, wanted: float) -> list[str]:
+        """Return the word in one line or several, in letters of the `wanted` size if all of it has room so.
 
         Without its number, which stands above the cards, if need be.
         """
         parts = re.split(r"\s(?=[^%])", self._word)
         names = [part for part in parts if not any(sign.isdigit() for sign in part)]
-        forms = ([self._word], parts, [" ".join(names)], names)
-        fits = (form for form in forms if len(form) <= most and all(self._is_read(one, box) for one in form))
+        whole = ([self._word], parts)
+        forms = (
+            *((form, wanted) for form in whole),
+            *((form, SMALL) for form in (*whole, [" ".join(names)], names)),
+        )
+        fits = (
+            form
+            for form, size in forms
+            if len(form) <= most and all(self._width(one, size) <= box.width() for one in form)
+        )
         return [one for one in next(fits, []) if one]
 
     def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
@@ -225,12 +237,8 @@ class GaitRing(QWidget):
         fits = not is_short and self._width(_widest(full)) <= room
         return full if fits else f"{letter} {now.percent:.0f} %"
 
-    def _is_read(self, text: str, box: QRectF) -> bool:
-        """Return whether it has room in letters that are read."""
-        return self._width(text) <= box.width()
-
-    def _width(self, text: str) -> float:
-        return QFontMetricsF(self._theme.text_font(SMALL, bold=True)).horizontalAdvance(text)
+    def _width(self, text: str, size: float = SMALL) -> float:
+        return QFontMetricsF(self._theme.text_font(size, bold=True)).horizontalAdvance(text)
 
     def _fitting(self, text: str, factor: float, place: QRectF, *, bold: bool) -> QFont:
         """As large as wanted, or as there is room for."""
