@@ -103,6 +103,22 @@ def test_a_large_window_that_shows_the_list_has_no_bar(window: MainWindow, bench
     assert window.others.isHidden()
 
 
+def test_a_list_that_floats_does_not_count_as_seen(window: MainWindow, bench: Bench) -> None:
+    """It may be behind another panel, or beside the screen: Qt does not tell."""
+    add(bench, 2)
+    settle(window, bench)
+    assert not window.stop_everyone.isVisible()
+    window.docks[0].setFloating(True)
+    settle(window, bench)
+    assert not window.robots.shows_all
+    assert window.others.isVisible()
+    assert is_whole(window.stop_everyone)
+    window.docks[0].setFloating(False)
+    settle(window, bench)
+    assert window.robots.shows_all
+    assert window.others.isHidden()
+
+
 def test_one_robot_alone_has_no_bar(window: MainWindow, bench: Bench) -> None:
     window.docks[0].hide()
     settle(window, bench)

@@ -4,8 +4,8 @@ import itertools
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QByteArray, QPoint, QSettings, QSize, Qt
-from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow
+from PySide6.QtCore import QByteArray, QPoint, QRect, QSettings, QSize, Qt
+from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow, QWidget
 
 from gateway.units import Units
 from server_gui.core.settings.server_file import ServerSettings
@@ -22,6 +22,7 @@ from server_gui.views.frame.saved_state import (
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import running
+from tests.support.desk import described
 
 SMALL = QSize(1024, 700)
 SIZES = (1.0, 1.25, 1.5, 2.0)
@@ -125,6 +126,72 @@ def test_a_panel_that_floats_goes_out_of_the_way_of_stop(window: MainWindow, ben
     top = header.mapToGlobal(QPoint(0, header.height())).y()
     assert dock.frameGeometry().top() >= top
     dock.setFloating(False)
+
+
+def place(part: QWidget) -> QRect:
+    return QRect(part.mapToGlobal(QPoint()), part.size())
+
+
+def covers_top(window: MainWindow, dock: QDockWidget) -> bool:
+    above = (window.header, window.alarms, window.others, window.page_bar)
+    return any(part.isVisible() and dock.frameGeometry().intersects(place(part)) for part in above)
+
+
+@pytest.fixture
+def afloat(window: MainWindow, bench: Bench) -> QDockWidget:
+    """A panel that floats right below the window's top."""
+    window.move(0, 0)
+    bench.draw(window)
+    dock = window.docks[2]
+    dock.setFloating(True)
+    dock.resize(400, 200)
+    dock.move(600, place(window.page_bar).bottom() + 1)
+    QApplication.processEvents()
+    return dock
+
+
+def test_a_panel_that_floats_goes_out_of_the_way_of_a_window_that_moves(
+    window: MainWindow, bench: Bench, afloat: QDockWidget
+) -> None:
+    header = window.header
+    dock_y = afloat.y()
+    window.move(0, dock_y - header.stop.height())
+    bench.draw(window)
+    assert not afloat.frameGeometry().intersects(place(header.stop))
+    assert not covers_top(window, afloat)
+
+
+def test_a_panel_that_floats_goes_out_of_the_way_of_the_other_robots_and_of_larger_text(
+    window: MainWindow, bench: Bench, theme: Theme, afloat: QDockWidget
+) -> None:
+    bench.add("exo-02", 7421).take([described("exo-02")])
+    window.docks[0].hide()
+    bench.draw(window)
+    QApplication.processEvents()
+    assert window.others.isVisible()
+    assert not afloat.frameGeometry().intersects(place(window.others))
+    theme.set(scale=2.0)
+    bench.draw(window)
+    assert not covers_top(window, afloat)
+
+
+def test_a_panel_that_floats_goes_out_of_the_way_of_the_result_of_stop_all(
+    window: MainWindow, bench: Bench, afloat: QDockWidget
+) -> None:
+    line = place(window._middle).bottom()
+    afloat.move(300, line - 100)
+    QApplication.processEvents()
+    assert afloat.y() == line - 100, "there is nothing in its way yet"
+    bench.desk.stop_all("all")
+    bench.draw(window)
+    QApplication.processEvents()
+    result = place(window.stopped_all)
+    assert window.stopped_all.isVisible()
+    assert not afloat.frameGeometry().intersects(result)
+    afloat.move(300, result.y())
+    QApplication.processEvents()
+    assert not afloat.frameGeometry().intersects(result), "nor is it moved there"
+    assert not covers_top(window, afloat)
 
 
 def test_a_maximised_window_is_as_it_was(theme: Theme, bench: Bench, kept: QSettings) -> None:

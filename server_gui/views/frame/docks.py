@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt
+from PySide6.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QTabWidget, QWidget
 
 from server_gui.views.frame.dock_title import DockTitle, HasTools
@@ -30,7 +30,8 @@ class Docks(QObject):
 
     The last panel is seen only when it is asked for. What people have arranged in a roomy window is kept
     while it is narrow, and over the end of the program. However they are arranged, they are scrolled rather
-    than make the window larger than its screen, and one that floats goes out of the way of `uncovered`.
+    than make the window larger than its screen. One that floats goes out of the way of `uncovered`, the first
+    of which is the window's top: whichever of the two moves or grows.
     """
 
     def __init__(
@@ -38,7 +39,7 @@ class Docks(QObject):
         window: QMainWindow,
         theme: Theme,
         panels: Mapping[str, tuple[QWidget, Area]],
-        uncovered: QWidget,
+        uncovered: Sequence[QWidget],
     ) -> None:
         super().__init__(window)
         self._window = window
@@ -56,6 +57,8 @@ class Docks(QObject):
         self._is_held, self._held = False, list[QDockWidget]()
         self._size()
         self._usual = self._roomy = window.saveState(LAYOUT)
+        for one in {window, *(around for part in uncovered for around in _within(part, window))}:
+            one.installEventFilter(self)
 
     @property
     def state(self) -> QByteArray:
@@ -167,17 +170,27 @@ class Docks(QObject):
         return dock
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in MOVES and isinstance(watched, QDockWidget) and watched.isFloating():
-            self._uncover(watched)
+        if event.type() in MOVES:
+            for dock in [watched] if isinstance(watched, QDockWidget) else self.all:
+                if dock.isFloating() and dock.isVisible():
+                    self._uncover(dock)
         return False
 
     def _uncover(self, dock: QDockWidget) -> None:
-        """Below what nothing may cover, where it floats above that."""
-        whole = self._uncovered
-        above = QRect(whole.mapToGlobal(whole.rect().topLeft()), whole.size())
-        frame = dock.frameGeometry()
-        if whole.isVisible() and dock.isVisible() and frame.intersects(above):
-            dock.move(frame.x(), above.bottom() + 1)
+        """Move it up or down to the nearest place where it covers nothing of what is to be seen."""
+        whole = [QRect(one.mapToGlobal(QPoint()), one.size()) for one in self._uncovered if one.isVisible()]
+        frame, lowest = dock.frameGeometry(), dock.screen().availableGeometry().bottom() - dock.height()
+
+        def is_free(y: int) -> bool:
+            return not any(frame.translated(0, y - frame.y()).intersects(one) for one in whole)
+
+        if is_free(frame.y()):
+            return
+        places = [y for one in whole for y in (one.bottom() + 1, one.top() - frame.height())]
+        free = [
+            y for y in places if y > whole[0].top() and is_free(y)
+        ]  # never above: its title could be off the screen
+        dock.move(frame.x(), min(free, key=lambda y: (y > lowest, abs(y - frame.y()))))
 
     def _size(self) -> None:
         px = self._theme.px
@@ -226,6 +239,12 @@ class Docks(QObject):
         dock.setTitleBarWidget(bar)  # type: ignore[arg-type]
         if before is not None:
             before.deleteLater()
+
+
+def _within(part: QWidget, window: QWidget) -> list[QWidget]:
+    """Return it and what it is within, with which it moves, up to the window."""
+    parent = part.parentWidget()
+    return [part] if parent is None or parent is window else [part, *_within(parent, window)]
 
 
 def _room() -> QScrollArea:

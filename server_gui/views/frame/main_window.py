@@ -364,7 +364,7 @@ class MainWindow(QMainWindow):
             "Events": (self.events, below),
             "Help": (self.help, right),
         }
-        self._panels = Docks(self, self._theme, panels, above)
+        self._panels = Docks(self, self._theme, panels, (above, self.stopped_all))
         *self.docks, self._manual = self._panels.all
 
     def _scaled(self) -> None:

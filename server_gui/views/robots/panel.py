@@ -35,6 +35,7 @@ from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.visibility import is_all_seen
 
 NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
 HINT_ALL: Final = (
@@ -88,7 +89,7 @@ class RobotCard(ClickableFrame):
     @property
     def is_whole(self) -> bool:
         """Whether all of it is on the screen."""
-        return self.isVisible() and self.visibleRegion().boundingRect() == self.rect()
+        return is_all_seen(self)
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
@@ -243,7 +244,7 @@ class RobotsPanel(QWidget):
 
     @property
     def shows_all(self) -> bool:
-        """Whether the cards of all robots are whole on the screen: not one has to be scrolled to."""
+        """Whether the cards of all robots are whole on the screen, none to be scrolled to, none floating."""
         return all(card.is_whole for card in self.cards)
 
     def _restyle(self) -> None:

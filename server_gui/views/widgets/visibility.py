@@ -1,6 +1,6 @@
 """Visibility and keyboard focus of a widget."""
 
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QDockWidget, QWidget
 
 
 def has_focus_in(panel: QWidget) -> bool:
@@ -10,5 +10,14 @@ def has_focus_in(panel: QWidget) -> bool:
 
 
 def is_seen(widget: QWidget) -> bool:
-    """Return whether any of it is on the screen: not behind another panel, and not scrolled away."""
-    return widget.isVisible() and not widget.visibleRegion().isEmpty()
+    """Return whether any of it is on the screen: not behind another panel, and not scrolled away.
+
+    What floats never counts: Qt does not know whether another window or the screen's edge hides it.
+    """
+    floats = isinstance(widget.window(), QDockWidget)
+    return widget.isVisible() and not floats and not widget.visibleRegion().isEmpty()
+
+
+def is_all_seen(widget: QWidget) -> bool:
+    """Return whether all of it is on the screen, likewise."""
+    return is_seen(widget) and widget.visibleRegion().boundingRect() == widget.rect()
