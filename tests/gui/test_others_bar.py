@@ -3,14 +3,16 @@
 import time
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.robots.others_bar import OthersBar
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Bench, stop_is_whole
@@ -96,7 +98,7 @@ def test_a_large_window_that_shows_the_list_has_no_bar(window: MainWindow, bench
     assert window.others.isHidden()
     window.docks[0].hide()
     settle(window, bench)
-    assert [chip.station.title for chip in window.others.chips] == ["exo-02"]
+    assert [chip.station.title for chip in window.others.chips] == ["exo-01", "exo-02"]
     assert window.others.isVisible()
     window.docks[0].show()
     settle(window, bench)
@@ -129,14 +131,14 @@ def test_a_chip_stops_its_robot_alone_and_a_click_leads_to_it(window: MainWindow
     other = add(bench, 2)
     window.docks[0].hide()
     settle(window, bench)
-    (chip,) = window.others.chips
+    _, chip = window.others.chips
     assert chip.stop.accessibleName() == "STOP exo-02"
     QTest.mousePress(chip.stop, Qt.MouseButton.LeftButton)
     assert [len(commands.named("stop")) for commands in bench.commands] == [0, 1]
     QTest.mouseClick(chip, Qt.MouseButton.LeftButton)
     assert bench.desk.selected is other
     settle(window, bench)
-    assert [chip.station.title for chip in window.others.chips] == ["exo-01"], "the other one now"
+    assert [chip.property("selected") for chip in window.others.chips] == [False, True]
     bench.desk.remove(bench.station)
     settle(window, bench)
     assert window.others.isHidden()
@@ -150,14 +152,82 @@ def test_a_chip_says_what_the_card_says_of_a_stop_that_is_not_confirmed_and_of_w
     other.stop("test")
     bench.commands[1].fail(NotConnected("there is no link"))
     settle(window, bench)
-    (chip,), card = window.others.chips, window.robots.cards[1]
+    (_, chip), card = window.others.chips, window.robots.cards[1]
     assert chip.state.shown.startswith("STILL MOVING"), "its drives are enabled"
     assert chip.state._wordings == card._state._wordings
     gone = add(bench, 3)
     gone.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
     settle(window, bench)
-    assert window.others.chips[1]._icon._mark.colour != "good"
-    assert "no link" in window.others.chips[1].state._wordings
+    assert window.others.chips[2]._icon._mark.colour != "good"
+    assert "no link" in window.others.chips[2].state._wordings
+
+
+@pytest.fixture
+def chips(window: MainWindow, bench: Bench) -> OthersBar:
+    """Four robots beside each other, the first of which is looked at."""
+    for number in range(2, 5):
+        add(bench, number)
+    window.docks[0].hide()
+    settle(window, bench)
+    window.activateWindow()
+    QApplication.processEvents()
+    return window.others
+
+
+def test_no_robot_changes_its_place_when_another_one_is_looked_at(
+    window: MainWindow, bench: Bench, chips: OthersBar
+) -> None:
+    """STOP exo-01 came under the pointer that had clicked on exo-02."""
+    places = [chip.geometry() for chip in chips.chips]
+    names = [chip.stop.accessibleName() for chip in chips.chips]
+    assert names == ["STOP exo-01", "STOP exo-02", "STOP exo-03", "STOP exo-04"]
+    for station in bench.desk.stations:
+        bench.desk.select(station)
+        settle(window, bench)
+        assert [chip.geometry() for chip in chips.chips] == places
+        assert [chip.stop.accessibleName() for chip in chips.chips] == names
+        assert [chip.property("selected") for chip in chips.chips].count(True) == 1
+
+
+def test_a_double_click_on_a_chip_looks_at_one_robot(
+    window: MainWindow, bench: Bench, chips: OthersBar
+) -> None:
+    asked: list[str] = []
+    for chip in chips.chips:
+        chip.chosen.connect(lambda chip=chip: asked.append(chip.station.title))
+    QTest.mouseClick(chips.chips[1], Qt.MouseButton.LeftButton)
+    where = QPointF(chips.chips[2].rect().center())  # its place meanwhile, by some other change
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    second = QMouseEvent(QEvent.Type.MouseButtonDblClick, where, where, left, left, none)
+    QApplication.sendEvent(chips.chips[2], second)
+    assert asked == ["exo-02"]
+
+
+def test_the_keyboard_stays_at_a_chips_stop_and_goes_to_no_other_with_it(
+    window: MainWindow, bench: Bench, chips: OthersBar
+) -> None:
+    third = chips.chips[2]
+    third.stop.setFocus()
+    assert third.stop.hasFocus()
+    add(bench, 5)
+    settle(window, bench)
+    assert third.stop.hasFocus()
+    window.resize(1024, 700)  # fewer beside each other
+    settle(window, bench)
+    assert third.stop.hasFocus()
+    bench.desk.select(third.station)
+    settle(window, bench)
+    assert third.stop.hasFocus()
+    bench.desk.remove(third.station)
+    settle(window, bench)
+    assert QApplication.focusWidget() is None
+    window.resize(1920, 1080)
+    settle(window, bench)
+    chips.chips[0].stop.setFocus()
+    window.docks[0].show()
+    settle(window, bench)
+    assert chips.isHidden()
+    assert QApplication.focusWidget() is None
 
 
 def test_many_robots_on_a_small_screen_leave_two_thirds_to_the_rest(

@@ -1,8 +1,8 @@
-"""The other robots, each with its worst state and its STOP, where the cards of the list are out of sight."""
+"""Every robot with its worst state and its STOP, where the cards of the list are out of sight."""
 
 from typing import Final
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
@@ -16,6 +16,7 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.visibility import let_go
 
 A_STATE: Final = 150  # wide, at text of 100 %: STOP NOT CONFIRMED has room
 STOP_SHARE: Final = 0.5  # of a chip's width at most, which its STOP with the robot's name may take
@@ -38,7 +39,7 @@ class RobotChip(ClickableFrame):
         row.addWidget(self.state, 1)
         row.addWidget(self.stop)
 
-    def refresh(self) -> None:
+    def refresh(self, *, selected: bool) -> None:
         """Show how it is now."""
         words, title = state_words(self.station), self.station.title
         self._icon.show_mark(self.station.mark)
@@ -46,7 +47,11 @@ class RobotChip(ClickableFrame):
         self.stop.name(title)
         self.setAccessibleName(f"Robot {title}")
         self.setAccessibleDescription(words[0])
-        set_tip(self, "\n".join(filter(None, (f"Look at {title}", state_tip(self.station)))))
+        leads = f"{title} is shown" if selected else f"Look at {title}"
+        set_tip(self, "\n".join(filter(None, (leads, state_tip(self.station)))))
+        if self.property("selected") != selected:
+            self.setProperty("selected", selected)
+            self.style().polish(self)
 
     def needs(self, room: int) -> int:
         """Return how wide it is with its state and, of so much room for all of it, the name on its STOP."""
@@ -56,15 +61,18 @@ class RobotChip(ClickableFrame):
 
 
 class OthersBar(ScrollArea):
-    """Hidden while `panel` shows the card of every robot whole."""
+    """Hidden while `panel` shows the card of every robot whole.
+
+    Each robot keeps its place, also the one that is looked at: the next click meets no other robot's STOP.
+    """
 
     def __init__(self, desk: Desk, theme: Theme, panel: RobotsPanel) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
         self._panel = panel
-        self._chips: list[RobotChip] = []
-        self._placed: object = None
+        self.chips: list[RobotChip] = []
+        self._places: dict[RobotChip, tuple[int, int]] = {}
         self.setAccessibleName("Other robots")
         page = QWidget()
         page.setObjectName("dock")
@@ -76,55 +84,52 @@ class OthersBar(ScrollArea):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.hide()
 
-    @property
-    def chips(self) -> list[RobotChip]:
-        """Those that are shown."""
-        return [chip for chip in self._chips if chip.station is not self._desk.selected]
-
     def refresh(self) -> None:
         """Show how they are now; before the panel does, whose new cards have no places yet."""
         stations = self._desk.stations
-        for chip in [chip for chip in self._chips if chip.station not in stations]:
-            self._chips.remove(chip)
+        for chip in [chip for chip in self.chips if chip.station not in stations]:
+            self.chips.remove(chip)
+            self._places.pop(chip, None)
+            let_go(chip)
             chip.hide()
             chip.deleteLater()
-        for station in stations[len(self._chips) :]:
+        for station in stations[len(self.chips) :]:
             self._add(station)
-        self.setVisible(len(stations) > 1 and not self._panel.shows_all)
-        if not self.isHidden():
+        is_needed = len(stations) > 1 and not self._panel.shows_all
+        if not is_needed:
+            let_go(self)
+        self.setVisible(is_needed)
+        if is_needed:
             for chip in self.chips:
-                chip.refresh()
+                chip.refresh(selected=chip.station is self._desk.selected)
             self._arrange()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._arrange()
 
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.StyleChange:  # text may have another size
-            self._placed = None
-
     def _add(self, station: Station) -> None:
         chip = RobotChip(station, self._theme)
         chip.chosen.connect(lambda: self._desk.select(station))
         chip.stop.stopped.connect(lambda: station.stop("stop button beside the pages"))
-        self._chips.append(chip)
+        self.chips.append(chip)
 
     def _arrange(self) -> None:
         """Arrange as many beside each other as have room, and be as high as they need."""
-        shown, grid, room = self.chips, self._grid, self.viewport().width() - 2 * AROUND
-        columns = max(min(room // max((chip.needs(room) for chip in shown), default=1), len(shown)), 1)
-        if (shown, columns) != self._placed:
-            self._placed = shown, columns
-            for chip in self._chips:
-                grid.removeWidget(chip)
-                chip.setVisible(False)
-            for place, chip in enumerate(shown):
-                grid.addWidget(chip, *divmod(place, columns))
-                chip.setVisible(True)
-            for column in range(len(self._chips)):
-                grid.setColumnStretch(column, int(column < columns))
+        grid, room = self._grid, self.viewport().width() - 2 * AROUND
+        columns = max(
+            min(room // max((chip.needs(room) for chip in self.chips), default=1), len(self.chips)), 1
+        )
+        places = {chip: divmod(number, columns) for number, chip in enumerate(self.chips)}
+        moved = [chip for chip, place in places.items() if self._places.get(chip) != place]
+        self._places = places
+        for chip in moved:
+            grid.removeWidget(chip)
+        for chip in moved:  # one that is hidden meanwhile loses the keyboard
+            grid.addWidget(chip, *places[chip])
+            chip.show()
+        for column in range(len(self.chips)):
+            grid.setColumnStretch(column, int(column < columns))
         high = min(grid.sizeHint().height(), self.window().height() // SHARE)
         if self.minimumHeight() != high or self.maximumHeight() != high:
             self.setFixedHeight(high)

@@ -35,7 +35,7 @@ from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
-from server_gui.views.widgets.visibility import is_all_seen
+from server_gui.views.widgets.visibility import is_all_seen, let_go
 
 NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
 HINT_ALL: Final = (
@@ -230,6 +230,7 @@ class RobotsPanel(QWidget):
         for card in [card for card in self.cards if card.station not in stations]:
             self.cards.remove(card)
             self._list.removeWidget(card)
+            let_go(card)
             card.hide()
             card.deleteLater()
         for station in stations[len(self.cards) :]:

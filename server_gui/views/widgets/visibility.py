@@ -21,3 +21,10 @@ def is_seen(widget: QWidget) -> bool:
 def is_all_seen(widget: QWidget) -> bool:
     """Return whether all of it is on the screen, likewise."""
     return is_seen(widget) and widget.visibleRegion().boundingRect() == widget.rect()
+
+
+def let_go(widget: QWidget) -> None:
+    """Have the keyboard nowhere where it is in this, which goes: else Qt gives it to what is next to it."""
+    focused = QApplication.focusWidget()
+    if focused is not None and (focused is widget or widget.isAncestorOf(focused)):
+        focused.clearFocus()
