@@ -15,6 +15,7 @@ from gateway.client import ClockOffset, ConnectionState, LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
+from server_gui.core.tuning.writing import Trial
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.header import Header, _outcome
 from server_gui.views.frame.main_window import MainWindow
@@ -152,6 +153,39 @@ def test_the_result_of_stop_all_is_wholly_in_sight_beside_each_robots_own_until_
         commands.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
     bench.draw(window)
     assert bar.text == ""
+
+
+@pytest.mark.parametrize("called", ["exo-05", "exo-of-the-clinic-beside-the-river-05"])
+def test_the_time_and_the_buttons_of_a_trial_and_the_result_of_stop_all_are_whole_on_a_small_screen(
+    window: MainWindow, bench: Bench, theme: Theme, called: str
+) -> None:
+    for name in ("exo-02", "exo-03", "exo-04", called):
+        bench.add(name, 7420 + len(bench.desk.stations)).take([described(name)])
+    trial = window.trial
+    until_ns = time.monotonic_ns() + 3_600_000_000_000
+    bench.desk.stations[-1].writing.trial = Trial(
+        7, {"gait.step_length": 0.43}, {"gait.step_length": 0.4}, until_ns
+    )
+    bench.draw(window)
+    assert "400 → 430 mm; taken back in" in trial.words.text()
+    theme.set(scale=2.0)
+    window.resize(1024, 700)
+    bench.desk.stop_all("all")
+    for commands in bench.commands:
+        commands.fail(NotConnected("there is no link"))
+    for tab in (0, 6):
+        window.tabs.setCurrentIndex(tab)
+        for _ in range(3):
+            bench.draw(window)
+        buttons = trial.findChildren(QPushButton)
+        assert len(buttons) == 3
+        for part in (trial.words, *buttons, window.stopped_all):
+            assert part.visibleRegion().boundingRect() == part.rect(), part
+            assert part.height() >= part.minimumSizeHint().height(), part
+        assert trial.words.text().startswith("exo-")
+        assert trial.words.text().endswith(" s"), "until it is taken back"
+        assert stop_is_whole(window)
+    bench.desk.stations[-1].writing.trial = None
 
 
 @pytest.mark.parametrize(

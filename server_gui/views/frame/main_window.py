@@ -119,6 +119,7 @@ class MainWindow(QMainWindow):
         self._middle = QWidget()
         self.setCentralWidget(self._middle)
         self._pages = QStackedWidget()
+        self._pages.setMinimumHeight(1)  # of what is in the middle they yield, not what is below them
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
         self.alarms = AlarmStrip(desk, theme, self._pages)
