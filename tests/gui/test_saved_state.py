@@ -169,7 +169,7 @@ def test_a_panel_that_floats_goes_out_of_the_way_of_the_other_robots_and_of_larg
     bench.draw(window)
     QApplication.processEvents()
     assert window.others.isVisible()
-    assert not afloat.frameGeometry().intersects(place(window.others))
+    assert not covers_top(window, afloat)
     theme.set(scale=2.0)
     bench.draw(window)
     assert not covers_top(window, afloat)
