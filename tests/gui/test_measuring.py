@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.measuring import Measured, measure, nearest, row_at
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.plot import Plot
+from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.workspace.measuring import TITLES, Measuring
 from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
@@ -115,6 +115,22 @@ def test_the_wheel_zooms_every_plot_while_data_go_on(signals: Signals, bench: Be
     signals.refresh()
     assert first.window_s == (left, right), "new rows moved what somebody has zoomed to"
     assert not np.array_equal(picture, first._lines.strip.pixels), "new rows are not drawn"
+
+
+def test_the_newest_row_stays_at_now_in_a_plot_of_another_size_until_it_is_drawn_anew(theme: Theme) -> None:
+    """What was drawn before a page was laid out stood at its old end of time."""
+    plot = Plot(theme, 10.0)
+    plot.set_curves([Curve(KNEE, "accent")])
+    plot.grab()  # which lays it out
+    plot.draw(object(), np.arange(9.0, 11.0), [np.ones(2)], live=True)
+    for wide in (138, 400, 700):
+        plot._lines.resize(wide, 60)
+        drawn = plot._lines.grab().toImage()
+        behind = theme.colour("card").rgb()
+        inked = [x for x in range(wide) if any(drawn.pixel(x, y) != behind for y in range(60))]
+        assert inked[-1] >= 0.98 * wide - 1, wide
+        assert inked[0] == pytest.approx(0.9 * wide, abs=0.02 * wide), wide
+    destroy(plot)
 
 
 def test_the_zoom_shows_its_part_of_the_past(signals: Signals, bench: Bench) -> None:

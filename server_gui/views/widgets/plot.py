@@ -87,6 +87,8 @@ class Curves(QWidget):
         painter.fillRect(self.rect(), self._behind)
         painter.setOpacity(1.0 if self._live else OLD)
         ratio, seam, (height, width) = self.devicePixelRatioF(), self.strip.seam, self._pixels.shape
+        if (width, height) != size_in_pixels(self):  # until it is drawn anew, its newest is still at the end
+            painter.scale(self.width() * ratio / width, self.height() * ratio / height)
         for begin, end, at in ((seam, width, 0), (0, seam, width - seam)):
             painter.drawImage(QPointF(at / ratio, 0), self._image, QRect(begin, 0, end - begin, height))
         painter.end()
@@ -232,8 +234,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             self._follow_new(source, times, columns, scale)
         self._be_blank(not any(np.isfinite(values).any() for values in columns))
         _, (low, high) = self.getViewBox().viewRange()
-        ratio = self.devicePixelRatioF()
-        width, height = (max(1, round(side * ratio)) for side in (self._lines.width(), self._lines.height()))
+        width, height = size_in_pixels(self._lines)
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
@@ -411,6 +412,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             tuple(curve.thin for curve in self._curves),
             theme.colour("card").rgba(),
         )
+
+
+def size_in_pixels(widget: QWidget) -> tuple[int, int]:
+    """Return width and height of a widget in pixels of its screen, at least one each."""
+    ratio = widget.devicePixelRatioF()
+    return max(1, round(widget.width() * ratio)), max(1, round(widget.height() * ratio))
 
 
 def css(theme: Theme, name: str) -> str:
