@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QPushButton, QTreeWidgetItem
 
@@ -14,6 +15,7 @@ from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.store_reach import Reach
 from server_gui.core.desk.recording import By, Recording
+from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.cloud.jobs_table import SAID, JobsTable
 from server_gui.views.theme import Theme
@@ -89,13 +91,28 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
     cloud._recording.look()
     shown.draw()
-    assert "2 batches wait · 5.0 MiB on this computer · " in cloud.waiting.text()
+    assert "5.0 MiB not uploaded yet: 2 batches · " in cloud.waiting.text()
     assert "2 batches uploaded\n" in cloud.waiting.text()
     assert "Not uploaded, retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
     said = "what was recorded until now waits for the store: an upload failed, retried automatically"
     assert said in [item.text for item in bench.desk.news.items]
+
+
+@pytest.mark.parametrize(
+    ("pending", "said"), [(0, "nothing waits · "), (1 << 20, "1.0 MiB not uploaded yet: not a batch yet · ")]
+)
+def test_rows_that_are_no_batch_yet_wait_as_well(
+    shown: Shown, archive: Archive, bench: Bench, pending: int, said: str
+) -> None:
+    recorded = replace(report(), uploader=UploaderState(2, 0, pending))
+    shown.open("Cloud")
+    cloud = shown.window.tabs.cloud
+    cloud._recording = Recording(By.WINDOW, FakeKeeper(recorded), lambda call: call(), bench.desk.news)
+    cloud._recording.look()
+    shown.draw()
+    assert cloud.waiting.text().startswith(said)
 
 
 def test_while_the_store_is_away_the_button_tries_again_at_once(

@@ -125,8 +125,15 @@ def test_all_is_well() -> None:
     recording, news = looked(FakeKeeper(report()))
     said = recording.said(ADDRESS)
     assert said.tone is Tone.GOOD
-    assert said.text == "Recording · 50 rows/s · spool 5.0 MiB · all uploaded · 31.00 GiB free"
+    assert said.text == "Recording · 50 rows/s · 5.0 MiB to upload · 31.00 GiB free"
     assert not news.items
+
+
+def test_all_is_uploaded_only_where_not_a_row_waits() -> None:
+    empty = replace(report(), uploader=UploaderState(2))
+    assert " · all uploaded · " in looked(FakeKeeper(empty))[0].said(ADDRESS).text
+    no_batch_yet = replace(report(), uploader=UploaderState(2, 0, 1 << 20, problem=AWAY))
+    assert "store not reached, 1.0 MiB to upload" in looked(FakeKeeper(no_batch_yet))[0].said(ADDRESS).text
 
 
 @pytest.mark.parametrize("age_s", [None, 5.0])
@@ -233,7 +240,7 @@ def test_a_store_that_is_away_is_a_warning_and_recording_goes_on() -> None:
     recording, news = looked(FakeKeeper(report(problem=AWAY, waiting=3)))
     said = recording.said(ADDRESS)
     assert said.tone is Tone.WARNING
-    assert "store not reached, 3 to upload" in said.text
+    assert "store not reached, 5.0 MiB to upload" in said.text
     assert said.reason == "an upload failed"
     recording.reach.looked(AWAY)
     assert recording.said(ADDRESS).reason == "store not reached", "the header's second line begins with it"

@@ -449,11 +449,12 @@ def _told_as(trouble: Trouble) -> str:
 
 
 def _queue(report: CollectorReport, *, is_reached: bool) -> list[str]:
-    uploader = report.uploader
-    spool = f"spool {size(uploader.backlog_bytes)}"
+    """Return what is on this computer alone, with the newest rows, which are no batch yet."""
+    pending = report.uploader.backlog_bytes
+    to_upload = f"{size(pending)} to upload"
     if not is_reached:
-        return [spool, f"{NOT_REACHED}, {uploader.waiting} to upload"]
-    return [spool, f"{uploader.waiting} to upload" if uploader.waiting else "all uploaded"]
+        return [f"{NOT_REACHED}, {to_upload if pending else 'nothing to upload'}"]
+    return [to_upload if pending else "all uploaded"]
 
 
 def _coming(rows_per_s: float, links: Sequence[LinkReport]) -> str:

@@ -293,7 +293,7 @@ class Collector:
             disk_free_bytes=self._disk_free(),
             robots=self._fleet.report(),
             recorder=self._recorder.state,
-            uploader=self._uploader.state,
+            uploader=self._uploader.look(),
             threads=self.watch.look(),
             is_paused=self._fleet.is_paused,
             prediction=None if self._prediction is None else self._prediction.state,

@@ -289,10 +289,12 @@ class Spool:
         return found
 
     def backlog_bytes(self) -> int:
-        """Return the size of the pending data, including the segment being written."""
+        """Return the size of the pending data, including the segment being written once it has rows."""
+        current = self._current
         return sum(
             Segment.size_bytes(self._files.path(number))
             for number in self._files.all_of(SegmentState.WAITING)
+            if number < current.number or (number == current.number and current.rows)
         )
 
     def make_room(self) -> bool:

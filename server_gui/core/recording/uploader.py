@@ -33,7 +33,7 @@ class UploaderState:
 
     uploaded: int = 0  # segments since the start
     waiting: int = 0  # segments that are frozen and not in the store
-    backlog_bytes: int = 0  # with what is being written
+    backlog_bytes: int = 0  # with the rows that are being written, which are no batch yet
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
@@ -107,6 +107,15 @@ class Uploader:
     def now(self) -> None:
         """Upload everything that waits, wanted or not."""
         self._asked.set()
+
+    def look(self) -> UploaderState:
+        """Return the state with what waits at this instant, from any thread: an attempt may be a minute ago.
+
+        Raises:
+            SpoolUnusable: what waits is not known.
+
+        """
+        return self._with_backlog(self.state)
 
     # --- the uploader's thread
 
@@ -231,10 +240,13 @@ class Uploader:
 
     def _tell(self) -> list[int]:
         """Update the backlog, and return the pending batches."""
-        waiting, backlog = self._spool.waiting(), self._spool.backlog_bytes()
         damaged = tuple(map(str, self._spool.damaged()))
-        self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog, damaged=damaged)
-        return waiting
+        self.state = replace(self._with_backlog(self.state), damaged=damaged)
+        return self._spool.waiting()
+
+    def _with_backlog(self, state: UploaderState) -> UploaderState:
+        waiting, backlog = len(self._spool.waiting()), self._spool.backlog_bytes()
+        return replace(state, waiting=waiting, backlog_bytes=backlog)
 
 
 def _told(error: Exception) -> str:

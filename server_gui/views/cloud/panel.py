@@ -18,13 +18,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.amounts import size
+from gateway.amounts import counted, size
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.actions import check, download, upload
 from server_gui.core.cloud.credentials import endpoint_told, keys_told
 from server_gui.core.cloud.store_reach import AGAIN, Reach
 from server_gui.core.desk.recording import Recording
+from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import default_file
 from server_gui.views.cloud.browser import Browser
 from server_gui.views.cloud.jobs_table import JobsTable, under_way
@@ -226,9 +227,8 @@ class Cloud(QWidget):
             return
         self.spool.say("spool", str(report.spool))
         uploader = report.uploader
-        kept = f"{size(uploader.backlog_bytes)} on this computer"
         lines = [
-            " · ".join((_waiting(uploader.waiting), kept, _uploaded(uploader.uploaded))),
+            f"{_waiting(uploader)} · {_uploaded(uploader.uploaded)}",
             f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]
         if uploader.problem is not None:
@@ -264,8 +264,12 @@ class Cloud(QWidget):
         self._archive.jobs.add(f"Download {what}", download(self._archive.settings.store.url, folder, wanted))
 
 
-def _waiting(batches: int) -> str:
-    return "1 batch waits" if batches == 1 else f"{batches} batches wait" if batches else "nothing waits"
+def _waiting(uploader: UploaderState) -> str:
+    """Say what is on this computer alone: batches, and the newest rows, which are no batch yet."""
+    if not uploader.backlog_bytes:
+        return "nothing waits"
+    batches = counted(uploader.waiting, "batch", "batches") if uploader.waiting else "not a batch yet"
+    return f"{size(uploader.backlog_bytes)} not uploaded yet: {batches}"
 
 
 def _uploaded(batches: int) -> str:

@@ -168,7 +168,7 @@ def uploaded(bench: Bench) -> None:
     hand = bench.hand
     hand.click("Cloud")
     hand.click("Look again")
-    hand.sees("nothing waits", within_s=AGAIN_S)
+    hand.sees("batches uploaded", within_s=AGAIN_S)
     hand.sees("telemetry", within_s=AGAIN_S)
     hand.keep("cloud")
     hand.click("Overview")

@@ -51,6 +51,18 @@ def spool(tmp_path: Path) -> Iterator[Spool]:
         yield opened
 
 
+def test_rows_wait_from_the_first_on_and_before_the_next_attempt(tmp_path: Path) -> None:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool:
+        uploader = Uploader(spool, lambda: Store("file:///nowhere"))
+        assert uploader.look().backlog_bytes == 0, "an empty file waits for nothing"
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(0))
+            assert recorder.flush(WAIT_S)
+            newest = uploader.look()
+            assert (newest.waiting, newest.backlog_bytes > 0) == (0, True)
+        assert uploader.look().waiting == 1
+
+
 def test_an_upload_that_is_asked_for_between_two_looks_is_made(spool: Spool, folder_url: str) -> None:
     uploader = Uploader(spool, lambda: Store(folder_url), wanted=lambda: False)
     asked = uploader._asked = Between()
