@@ -188,6 +188,25 @@ def test_the_time_and_the_buttons_of_a_trial_and_the_result_of_stop_all_are_whol
     bench.desk.stations[-1].writing.trial = None
 
 
+def test_how_many_drives_confirmed_a_stop_all_has_room_in_the_smallest_window(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    bench.add("simulated-exo", 7421).take([described("simulated-exo")])
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    bench.desk.stop_all("all")
+    bench.first.answer(ALL)
+    bench.commands[1].answer(ALL)
+    later_ns = time.monotonic_ns() + 3_600_000_000_000
+    off: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    for station in bench.desk.stations:
+        station.take([telemetry([later_ns], off, later_ns)])
+    bench.draw(window)
+    drives = 2 * len(JOINTS)
+    assert f"{drives}/{drives} drives confirmed" in window.stopped_all.text
+    assert window.stopped_all.visibleRegion().boundingRect() == window.stopped_all.rect()
+
+
 @pytest.mark.parametrize(
     ("width", "height", "scale"), [(1024, 700, 1.5), (1366, 768, 1.0), (1920, 1080, 1.0)]
 )

@@ -14,7 +14,7 @@ from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
-LINES: Final = 2  # of text: what needs more is said more briefly, and whole in the tip
+LINES: Final = 3  # of text: what needs more is said more briefly, and whole in the tip
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 MOST: Final = 100_000  # pixels
 
