@@ -41,6 +41,15 @@ def test_an_event_leads_to_its_instant_in_the_signals_that_are_shown(
     assert left <= -2.0 <= right
 
 
+def test_how_often_something_came_stands_before_what_may_have_no_room(around: Around, bench: Bench) -> None:
+    for change in ("off → on", "on → off", "off → on"):
+        bench.desk.news.add(NewsKind.STATE, bench.station.name, f"all 6 drives: {change}")
+    bench.draw(around)
+    (line,) = (line for line in around.events.lines if "off → on" in line.text)
+    assert line.text.startswith("2 times since ")
+    assert line.text.endswith(": all 6 drives: off → on")
+
+
 def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
     around: Around, bench: Bench
 ) -> None:

@@ -15,6 +15,7 @@ class Tell(Protocol):
         """Tell it."""
 
 
+FEW: Final = 2  # drives that are named before their change
 LINK_WORDS: Final = {
     ConnectionState.CONNECTED: "connected",
     ConnectionState.WAITING: "no link",
@@ -83,8 +84,14 @@ class RobotNews:
         every = len(robot.names("joint"))
         for (before, word), joints in changed.items():
             kind = NewsKind.FAULT if "fault" in word else NewsKind.STATE
-            whose = f"all {every} drives" if len(joints) == every > 2 else ", ".join(map(_spoken, joints))
-            self._tell(kind, f"{whose}: {before} → {word}")
+            names = ", ".join(map(_spoken, joints))
+            change = f"{before} → {word}"
+            if len(joints) == every > FEW:
+                self._tell(kind, f"all {every} drives: {change}")
+            elif len(joints) > FEW:  # the change first: names have no room where there is little
+                self._tell(kind, f"{len(joints)} of {every} drives: {change} ({names})")
+            else:
+                self._tell(kind, f"{names}: {change}")
         self._look_at_errors(robot)
 
     def _look_at_errors(self, robot: Robot) -> None:

@@ -275,6 +275,6 @@ def _of_alarm(station: Station | None, one: Active) -> EventRow:
 
 
 def _of_item(item: Item, title: str, mark: Mark) -> EventRow:
-    again = "" if item.first_s is None else f"  ({item.count} times since {time_of_day(item.first_s)})"
-    text = f"{item.text}{again}"
+    again = "" if item.first_s is None else f"{item.count} times since {time_of_day(item.first_s)}: "
+    text = f"{again}{item.text}"  # what has no room stands at the end
     return EventRow(time_of_day(item.utc_s), mark, title, text, utc_s=item.utc_s, whose=item.robot)

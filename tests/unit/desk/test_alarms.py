@@ -275,13 +275,16 @@ def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_
 
 def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
     told: list[str] = []
+    others = [joint.replace("_", " ") for joint in JOINTS if joint != "left_knee"]
     news = RobotNews(lambda _kind, text, _about="": told.append(text))
-    for event in (states(4.0), states(5.0), states(5.0, left_knee=4.0)):
+    all_but_the_knee = states(6.0, left_knee=4.0)
+    for event in (states(4.0), states(5.0), states(5.0, left_knee=4.0), all_but_the_knee):
         bench.station.take([event])
         news.look(bench.station.robot)
     assert [text for text in told if "→" in text] == [
         "all 6 drives: operation enabled → quick stop active",
         "left knee: quick stop active → operation enabled",
+        f"5 of 6 drives: quick stop active → switch on disabled ({', '.join(others)})",
     ]
 
 
