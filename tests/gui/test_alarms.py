@@ -19,6 +19,7 @@ from gateway.client import ConnectionState, NotConnected
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.commissioning.stages import LOOKS, Stage
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
@@ -488,3 +489,17 @@ def test_what_to_check_has_room_before_the_register_of_a_code(
     said = window.alarms.details.text()
     assert said.startswith("since ")
     assert REMEDY in said
+
+
+@pytest.mark.parametrize("stage", [Stage.STOPPED, Stage.NOT_CONFIRMED, Stage.MOVING])
+def test_what_is_wrong_with_a_robot_that_is_commissioned_is_told_where_there_is_no_alarm(
+    around: Around, bench: Bench, stage: Stage
+) -> None:
+    bench.station.take([walking(300), looked()])
+    around.alarms.commissioned = lambda: ("exo-09", LOOKS[stage])
+    settle(around, bench)
+    assert around.alarms.headline.text() == f"exo-09 · {LOOKS[stage].mark.word}"
+    assert around.alarms.property("tone") == LOOKS[stage].mark.colour
+    around.alarms.commissioned = lambda: ("exo-09", LOOKS[Stage.WORKING])
+    settle(around, bench)
+    assert "exo-09" not in around.alarms.headline.text()

@@ -2,6 +2,8 @@
 
 import time
 
+import pytest
+
 from gateway.client import ConnectionState, NotConnected
 from gateway.wire.stop import Stopped
 from server_gui.core.follow.events import LinkChanged
@@ -166,4 +168,24 @@ def test_a_robot_that_is_enabled_is_not_removed_without_saying_so(around: Around
     asked.reject()
     bench.desk.remove(bench.station)
     newest = bench.desk.news.items[0]
-    assert "removed from this window while its drives were enabled" in newest.text
+    assert "removed while its drives were enabled: its STOP is gone" in newest.text
+
+
+@pytest.mark.parametrize("ends", ["acknowledged", "another is added"])
+def test_one_that_was_removed_while_enabled_stays_named_until_somebody_has_seen_to_it(
+    around: Around, bench: Bench, ends: str
+) -> None:
+    bench.station.take([walking(300), looked()])
+    bench.desk.remove(bench.station)
+    settle(around, bench)
+    strip = around.alarms
+    assert strip.headline.text() == "exo-01 was removed while its drives were enabled: its STOP is gone"
+    assert "use the hardware stop" in strip.details.text()
+    assert strip.property("tone") == "warn"
+    if ends == "acknowledged":
+        strip.buttons.acknowledge.click()
+    else:
+        bench.add("exo-02", 7421)
+    settle(around, bench)
+    assert "exo-01" not in strip.headline.text()
+    assert ends != "acknowledged" or not strip.buttons.acknowledge.isVisible()

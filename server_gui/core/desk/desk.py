@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from typing import Final
 
 from gateway.units import Units
 from gateway.wire.stop import Stopped
@@ -20,6 +21,8 @@ from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.tuning.stop import Sent
 
 log = logging.getLogger(__name__)
+
+GONE: Final = "its STOP is gone"
 
 
 @dataclass(slots=True)
@@ -42,6 +45,7 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
+        self.left_running: list[str] = []  # in words: robots that were removed, and may be enabled
         self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
@@ -89,7 +93,8 @@ class Desk:
         return len(self.stations) > 1 or self.commissions()
 
     def add(self, station: Station) -> None:
-        """Add a robot; the first is selected."""
+        """Add a robot; the first is selected, and who adds one sees to those that were removed no more."""
+        self.left_running.clear()
         self.stations.append(station)
         station.neighbours = self.stations
         if self.selected is None:
@@ -98,7 +103,10 @@ class Desk:
     def remove(self, station: Station) -> None:
         """Look at it no more; another one is selected where it was."""
         if not station.robot.is_recording:
-            station.tell(NewsKind.CONTROL, f"removed from this window{_left_as(station)}")
+            left_as = _left_as(station)
+            station.tell(NewsKind.CONTROL, f"removed {left_as}".rstrip())
+            if left_as:
+                self.left_running.append(f"{station.title} was removed {left_as}")
         if self._stop_all is not None:
             self._stop_all.remove(station)
         self.stations.remove(station)
@@ -164,7 +172,5 @@ def _words(error: Exception) -> str:
 def _left_as(station: Station) -> str:
     """Return how a robot is that nobody sees any more here, in words; "" where nothing of it is enabled."""
     if not station.is_live:
-        return "; whether its drives are enabled was not known"
-    return (
-        " while its drives were enabled: its STOP is not here any more" if any_enabled(station.robot) else ""
-    )
+        return f"while it was not known whether its drives are enabled: {GONE}"
+    return f"while its drives were enabled: {GONE}" if any_enabled(station.robot) else ""

@@ -1,6 +1,7 @@
 """The active alarms' line: the worst, always in the same place, so that nothing moves when one comes."""
 
 import time
+from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QRect, QSize, Qt, Signal
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout
 
 from server_gui.core.alarms.alarm import MORE
 from server_gui.core.alarms.texts import UNSTOPPED, Kind
+from server_gui.core.commissioning.stages import StageView
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
 from server_gui.views.alarms.words import (
@@ -25,6 +27,7 @@ from server_gui.views.alarms.words import (
     now_s,
     quiet,
 )
+from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.clickable_frame import ClickableFrame
@@ -34,6 +37,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
+LEFT_CHECK: Final = f"{REMEDY} add it again to see and stop it, or use the hardware stop"
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
 
@@ -56,6 +60,9 @@ class AlarmStrip(ClickableFrame):
         self._said: object = None  # what was fitted last
         self._changed_s = -HOLD_S  # when another alarm took the place of one
         self.told: tuple[Told, ...] = ()
+        self.commissioned: Callable[[], tuple[str, StageView] | None] = lambda: (
+            None
+        )  # its name, and how it is
         self.setAccessibleName("Active alarms")
         self._icon, self._words = MarkIcon(theme, 13), _Words()
         self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
@@ -75,7 +82,7 @@ class AlarmStrip(ClickableFrame):
         self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
         self.buttons.show_resources.clicked.connect(lambda: self.show_resources(self._first))
-        self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
+        self.buttons.acknowledge.clicked.connect(self._acknowledge_shown)
         again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
         self._words.resized.connect(self._say_again, again)
         theme.changed.connect(self._restyle)
@@ -102,6 +109,8 @@ class AlarmStrip(ClickableFrame):
             self._changed_s = time.monotonic()
         self._say(first)
         self.buttons.offer(first, all_of_them=self._is_wide)
+        if first is None and self._desk.left_running:
+            self.buttons.acknowledge.show()
         self.buttons.acknowledge.setEnabled(time.monotonic() - self._changed_s >= HOLD_S)
         self.more.setVisible(bool(self.told))
         set_button(self.more, "Details …" if len(self.told) == 1 else f"All {len(self.told)} …")
@@ -144,6 +153,23 @@ class AlarmStrip(ClickableFrame):
     def _first(self) -> Told:
         return self.told[0]
 
+    def _beside(self) -> tuple[Mark, str, str]:
+        """Return what is no alarm of a robot here: of one that was removed or is commissioned, or none."""
+        if left := self._desk.left_running:
+            return Mark("triangle", "warn", "removed"), "; ".join(left), LEFT_CHECK
+        commissioned = self.commissioned()
+        if commissioned is not None and commissioned[1].mark.colour in ("warn", "bad"):
+            name, look = commissioned
+            return look.mark, f"{name} · {look.mark.word}", look.words
+        return quiet(self._desk.selected, self._desk.recording)
+
+    def _acknowledge_shown(self) -> None:
+        if self.told:
+            self.acknowledge(self._first)
+            return
+        self._desk.left_running.clear()
+        self.refresh()
+
     def _turn(self) -> None:
         if self.told or self.list.isVisible():
             self.list.turn()
@@ -154,7 +180,7 @@ class AlarmStrip(ClickableFrame):
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
         if first is None:
-            mark, main, rest = quiet(self._desk.selected, self._desk.recording)
+            mark, main, rest = self._beside()
             wordings: tuple[str, ...] = (main,)
             fuller: tuple[str, ...] = (rest,)
         else:

@@ -159,6 +159,7 @@ class MainWindow(QMainWindow):
         if commissioning is not None:
             desk.commissions = lambda: commissioning.wish is not None
             self.header.commissioned = lambda: commissioning.name if commissioning.runs else ""
+            self.alarms.commissioned = lambda: (commissioning.name, commissioning.look_of)
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
