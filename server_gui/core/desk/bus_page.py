@@ -20,6 +20,7 @@ FEW: Final = 2  # lines of one kind
 BEFORE: Final = "silent by now"  # names the frames of the last second that are of nodes without a number
 FILLS: Final = "most of the load"
 SILENT: Final = frozenset({"lost", "stale"})
+GONE: Final = frozenset({Kind.LOST, Kind.PART_STALE})  # alarms about parts that are silent
 UNANSWERED: Final = Mark("triangle", "warn", "no SDO answer")
 FEW_PDOS: Final = Mark("cross", "warn", "PDOs missing")  # as a gap of a recording; ▲ has a confirmed STOP
 _HEARTBEAT: Final = re.compile(r"heartbeat has been missing for (\d+(?:\.\d+)? \w+)")
@@ -55,7 +56,7 @@ def rows(bus: BusInfo, parts: Mapping[str, FollowedComponent], alarms: Alarms, *
     silent = {
         node.node_id: words
         for node in bus.nodes
-        if (words := _silence(node, parts, by_node.get(node.node_id)))
+        if (words := _silence(node, parts, alarms, by_node.get(node.node_id)))
     }
     loud = [one for one in senders if one.node_id not in silent]
     before = sum(one.frames_per_s for one in senders if one.node_id in silent)
@@ -138,10 +139,16 @@ def _about(buses: Iterable[BusInfo]) -> set[str]:
     }
 
 
-def _silence(node: NodeInfo, parts: Mapping[str, FollowedComponent], talk: Talking | None) -> str | None:
-    """Return for how long a node has been silent, or its heartbeat missing; None where it is not."""
+def _silence(
+    node: NodeInfo, parts: Mapping[str, FollowedComponent], alarms: Alarms, talk: Talking | None
+) -> str | None:
+    """Return for how long a node has been silent, or its heartbeat missing; None where it is not.
+
+    Others may miss it, and an alarm say so, before the robot does.
+    """
     known = [parts[name] for name in node.components if name in parts]
-    gone = [one for one in known if one.state in SILENT]
+    missed = {alarm.subject for alarm in alarms.each if alarm.kind in GONE}
+    gone = [one for one in known if one.state in SILENT or one.name in missed]
     heart = next((found[1] for one in gone if (found := _HEARTBEAT.search(one.problem or ""))), None)
     if heart is not None:
         return f"silent {heart}" if talk is None else f"no heartbeat {heart}"

@@ -110,6 +110,21 @@ def test_a_silent_cause_stands_before_what_comes_of_it() -> None:
     assert names[:2] == ["left knee", "gait"]
 
 
+def test_a_cause_that_only_others_have_missed_yet_stands_first_with_its_time() -> None:
+    """It stood below the gait controller, which is unreliable by it, with – for its time."""
+    parts = {
+        **PARTS,
+        "left_knee": dataclasses.replace(PARTS["left_knee"], state="ok", age_ms=300.0, problem=None),
+    }
+    unreliable = Alarm(Kind.IMPLAUSIBLE, "gait", "a node that it listens to is silent", "gait", node="main")
+    missed = Alarm(
+        Kind.PART_STALE, "left_knee", "nothing comes", "left knee", node="main", under=(unreliable,)
+    )
+    first, second, *_ = rows(BUS, parts, told(missed), live=True)
+    assert (first.name, second.name) == ("left knee", "gait")
+    assert first.frames in ("silent 300 ms", "for 300 ms")
+
+
 def test_of_many_identifiers_the_lowest_and_the_highest_are_told_and_never_only_some() -> None:
     """Six drives' RPDOs were told as four."""
     rpdos = [TalkInfo("RPDO", node, 100.0, [0x200 + node]) for node in range(1, 7)]
