@@ -81,7 +81,6 @@ class BusCard(Card):
         self._kinds = WrappingLegend("Traffic by kind")
         self._past = Trend(theme, "Load over time", LEAST_LOAD, symbol=" %", digits=0)
         self._past.setObjectName("part")  # of this card: no frame of its own
-        self._rows: list[Row] = []
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
         self.table.setAccessibleName("Senders on the bus")
@@ -163,7 +162,6 @@ class BusCard(Card):
             self.table.setFixedHeight(
                 height * max(len(shown), 1) + self.table.horizontalHeader().sizeHint().height() + 4
             )
-        self._rows = shown
         for place, row in enumerate(shown):
             for column, said in enumerate(_texts(row)):
                 self._set(place, column, said, row.colour)
@@ -171,11 +169,7 @@ class BusCard(Card):
 
     def _fit(self) -> None:
         """Leave out parts without room as a whole: no number is cut, and no name while a part can go."""
-        self._say_states(brief=False)
         shown = self._columns()
-        if not {SHARE, MISSING, FRAMES} <= shown:  # a state's mark is enough: what it means stands above
-            self._say_states(brief=True)
-            shown = self._columns()
         for column in range(len(TITLES)):
             self.table.setColumnHidden(column, column not in shown)
 
@@ -187,11 +181,6 @@ class BusCard(Card):
             if sum(widths[known] for known in shown) > self.table.viewport().width():
                 shown.discard(column)
         return shown
-
-    def _say_states(self, *, brief: bool) -> None:
-        for place, row in enumerate(self._rows[: self.table.rowCount()]):
-            self._set(place, STATE, _state(row, brief=brief), row.colour)
-            self._set(place, SENDER, _sender(row, brief=brief), row.colour)
 
     def _set(self, row: int, column: int, text: str, colour: str) -> None:
         item = self.table.item(row, column)
@@ -227,16 +216,13 @@ def _colour_of(load_percent: float) -> str:
     return "bad" if load_percent >= FULL_PERCENT else "warn" if load_percent >= BUSY_PERCENT else "accent"
 
 
-def _sender(row: Row, *, brief: bool = False) -> str:
+def _sender(row: Row) -> str:
     """Name who sends; of what is not one of the robot's nodes the identifiers, too."""
-    return row.name if brief else f"{row.name} {row.ids}".rstrip()
+    return f"{row.name} {row.ids}".rstrip()
 
 
-def _state(row: Row, *, brief: bool = False) -> str:
-    if row.mark is None:
-        return ""
-    glyph = GLYPHS[row.mark.shape]
-    return glyph if brief else f"{glyph} {row.mark.word}"
+def _state(row: Row) -> str:
+    return "" if row.mark is None else f"{GLYPHS[row.mark.shape]} {row.mark.word}"
 
 
 def _texts(row: Row) -> tuple[str, ...]:
