@@ -291,7 +291,7 @@ def test_a_stop_is_proved_drive_by_drive_with_its_time_until_the_next_one(
     played.hear(told)
     draw(page)
     assert page.stopped.texts == [
-        ("node 5", "switch on disabled", "after 34 ms"),
+        ("node 5", "switch on disabled", "after 34\u00a0ms"),
         ("node 6", "operation enabled", "NOT CONFIRMED: unconfirmed"),
         ("node 7", "not known", "NOT CONFIRMED: unreachable"),
     ]
@@ -349,12 +349,14 @@ def test_a_drive_that_had_no_power_a_moment_before_has_only_answered(
     played.model.stop()
     played.hear(playing.stopped())
     draw(page)
-    assert page.stopped.texts == [("node 7", "switch on disabled", "was off · answered after 34 ms")]
+    assert page.stopped.texts == [("node 7", "switch on disabled", "was off · answered after 34\u00a0ms")]
     played.now_s += 60
     played.model.stop()
     played.hear(playing.stopped())
     draw(page)
-    assert page.stopped.texts == [("node 7", "switch on disabled", "after 34 ms")], "that was long before"
+    assert page.stopped.texts == [("node 7", "switch on disabled", "after 34\u00a0ms")], (
+        "that was long before"
+    )
 
 
 def test_what_leads_on_is_no_louder_than_stop_and_keeps_away_from_it(

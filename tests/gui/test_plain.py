@@ -15,7 +15,7 @@ from server_gui.views.resources.processes import ProcessModel
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import _unless_there
-from server_gui.views.widgets.plain import PlainLabel, rich, set_tip, tip
+from server_gui.views.widgets.plain import PlainLabel, rich, set_tip, tip, unbroken
 from server_gui.views.workspace.unit_plot import Drawn, UnitPlot
 
 BAD = '<img src="x"><b>left</b> [/b] & \x1b\u202e'
@@ -34,6 +34,14 @@ def test_a_label_shows_html_as_text(qt: QApplication) -> None:
         label.setText(BAD)
         assert label.textFormat() is Qt.TextFormat.PlainText
         assert label.text() == SHOWN
+
+
+def test_no_line_ends_between_a_number_and_its_unit() -> None:
+    said = "was off · answered after 27 ms; 32 error frames in the last 10 s, 18.5 % (2 m)."
+    kept = said.replace("27 ms", "27\u00a0ms").replace("10 s", "10\u00a0s").replace("5 %", "5\u00a0%")
+    assert unbroken(said) == kept.replace("2 m", "2\u00a0m")
+    assert unbroken("6 drives of 2 sides in 3 steps") == "6 drives of 2 sides in 3 steps"
+    assert PlainLabel(unbroken("27 ms")).text() == "27\u00a0ms"
 
 
 def test_a_tool_tip_shows_html_as_text(qt: QApplication) -> None:

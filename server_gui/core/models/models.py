@@ -10,10 +10,11 @@ from typing import Final
 from gateway.user_name import user_name
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.cloud.store_reach import StoreReach
+from server_gui.core.models import training
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import ModelChange, carry_out, promotion, way_back
 from server_gui.core.models.lessons import Lessons, lessons
-from server_gui.core.models.training import BETTER, Trained, TrainingWish
+from server_gui.core.models.training import Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
 
@@ -197,10 +198,9 @@ class Models:
         self._looked(Catalogue(problem=f"internal error, {type(error).__name__}"))
 
     def _over(self, job: Job) -> None:
-        good = Tone.GOOD if job.said.startswith(BETTER) else Tone.PLAIN
-        text = f"{job.name}: {job.said}"
         if job.state is JobState.FAILED:
-            self._say(text, Tone.BAD)
+            self._say(f"{job.name}: {job.said}", Tone.BAD)
         else:
-            self._results.append((text, good))
+            tone = Tone.PLAIN if job.said.lower().startswith(training.NOT_BETTER) else Tone.GOOD
+            self._results.append((f"Trained{job.name.removeprefix('Train')}: {job.said}", tone))
         self.look(now=True)

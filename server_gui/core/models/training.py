@@ -15,7 +15,6 @@ UNITS: Final = {
     "judging": "judged",
 }
 
-BETTER: Final = "Better"
 NOT_BETTER: Final = "not better"  # the verdict with which nothing is promoted
 NOT_COMPARED: Final = "not compared"  # with which the reasons say so themselves
 WORDS: Final = {

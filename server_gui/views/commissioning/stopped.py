@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from server_gui.core.commissioning.messages import StoppedMessage
 from server_gui.views.widgets.card import Card, set_text, set_tone
+from server_gui.views.widgets.plain import unbroken
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 TITLES: Final = ("Drive", "State", "Confirmed")
@@ -51,7 +52,7 @@ class StoppedCard(Card):
             for column, cell in enumerate(row):
                 cell.setVisible(place < len(rows))
                 if place < len(rows):
-                    set_text(cell, rows[place][column])
+                    set_text(cell, unbroken(rows[place][column]))
             if stopped is not None and place < len(rows):
                 has_confirmed = stopped.has_confirmed(rows[place][0])
                 set_tone(row[-1], "plain" if has_confirmed else "bad")

@@ -20,7 +20,7 @@ from server_gui.views.models.models_table import ModelsModel, ModelsTable
 from server_gui.views.models.train_form import TrainForm, offer_robots
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import PlainLabel, set_tip, unbroken
 from server_gui.views.widgets.scroll_area import bring_into_sight
 
 SLOW: Final = 6  # frames between two looks
@@ -190,7 +190,7 @@ class ModelsPage(QWidget):
             lines.append(EMPTY)
         set_text(self.state, "\n".join(lines))
         self.state.setVisible(bool(lines))
-        set_text(self.said, models.said)
+        set_text(self.said, unbroken(models.said))
         self.said.setVisible(bool(models.said))
         tone = models.tone.value
         if self.said.property("tone") != tone:

@@ -45,7 +45,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.cursors import FLAGS
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.mark import mark_icon
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import NO_BREAK, PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea, bring_into_sight
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.workspace.page import AROUND_S, Signals
@@ -65,7 +65,6 @@ NOT_REPLAYED_HINT: Final = (
     "What is replayed are the robot's signals: it was recorded by another version, without its buses' trouble"
 )
 READING: Final = "reading both recordings …"
-NO_BREAK: Final = "\u00a0"  # a number stays with its unit
 SETTLES: Final = 8  # frames until all plots are there
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)

@@ -15,6 +15,7 @@ from server_gui.views.alarms.words import in_window
 from server_gui.views.resources.bus_card import BusCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import unbroken
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 READ: Final = 6  # frames between two looks
@@ -83,5 +84,5 @@ class BusHealthView(QWidget):
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)
-        set_text(self.said, text)
+        set_text(self.said, unbroken(text))
         self.said.setVisible(bool(text))

@@ -1,6 +1,7 @@
 """Labels and tool tips that show a name as it is: Qt takes whatever looks like HTML for HTML, unless told."""
 
 import html
+import re
 from typing import Final, Protocol
 
 from PySide6.QtCore import Qt
@@ -8,7 +9,11 @@ from PySide6.QtWidgets import QLabel
 
 from gateway.plain_text import plain
 
-KEPT: Final = "\n\u00a0"  # a line ends, and a number stays with its unit: neither commands anything
+NO_BREAK: Final = "\u00a0"
+KEPT: Final = f"\n{NO_BREAK}"  # a line ends, and a number stays with its unit: neither commands anything
+_BEFORE_UNIT: Final = re.compile(
+    r"(?<=\d) (?=(?:%|°C?|µs|ms|s|min|h|Hz|kHz|mm|m|N|N·m|A|V|kPa|frames/s|rows/s|KiB|MiB|GiB)(?![\w·/]))"
+)
 
 
 class PlainLabel(QLabel):
@@ -33,6 +38,11 @@ class Tipped(Protocol):
     def setToolTip(self, text: str) -> None:
         """Show this where the pointer rests."""
         ...
+
+
+def unbroken(text: str) -> str:
+    """Text in which no line ends between a number and its unit."""
+    return _BEFORE_UNIT.sub(NO_BREAK, text)
 
 
 def rich(text: str) -> str:
