@@ -503,3 +503,22 @@ def test_what_is_wrong_with_a_robot_that_is_commissioned_is_told_where_there_is_
     around.alarms.commissioned = lambda: ("exo-09", LOOKS[Stage.WORKING])
     settle(around, bench)
     assert "exo-09" not in around.alarms.headline.text()
+
+
+def test_a_line_that_fits_without_a_scroll_bar_leaves_what_to_check_its_room(
+    around: Around, bench: Bench, theme: Theme
+) -> None:
+    """What to check was cut while one of three lines stood empty."""
+    theme.set(scale=1.5)
+    around.resize(1500, 900)
+    fault(bench)
+    settle(around, bench)
+    strip = around.alarms
+    told = strip.told[0][1].alarm
+    wide = strip.headline.fontMetrics().horizontalAdvance(told.line)
+    for _ in range(3):
+        around.resize(around.width() + wide + 6 - strip._words.maximumViewportSize().width(), 900)
+        settle(around, bench)
+    assert strip.headline.text() == told.line
+    assert strip.details.text().startswith("since ")
+    assert strip.details.text().endswith(told.check)

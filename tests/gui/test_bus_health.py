@@ -87,7 +87,7 @@ def test_how_often_it_was_opened_is_in_words(
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
-    assert spaced(view.said.text()) == "bus full: main: it is full: 100 % of its time is taken"
+    assert spaced(view.said.text()) == "bus full: main: 100 % of its time is taken"
     assert view.checks.text().startswith("→ 89 % of its frames are from left knee, the most: send fewer PDOs")
     assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"

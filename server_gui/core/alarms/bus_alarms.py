@@ -1,5 +1,6 @@
 """The alarms of a CAN bus: its load, which has a beginning of its own, and all else that is wrong with it."""
 
+import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -10,6 +11,8 @@ from server_gui.core.processing.bus_health import BusHealthLevel, joined, of_loa
 
 OF_LOAD: Final = Kind.BUS_FULL, Kind.BUS_BUSY
 OF_ALL_ELSE: Final = Kind.BUS_FAILS, Kind.BUS
+
+_SAID: Final = re.compile(r"^it is (?:full|busy): ")  # as the alarm's own word says
 
 
 def bus_alarms(bus: BusInfo, *, is_now: bool = True) -> Iterator[Alarm]:
@@ -23,4 +26,5 @@ def bus_alarms(bus: BusInfo, *, is_now: bool = True) -> Iterator[Alarm]:
         if said is not None:
             kind = grave if any(level is BusHealthLevel.ALARM for level, _, _ in found) else usual
             what, check = said
+            what = _SAID.sub("", what) if is_load else what
             yield Alarm(kind, f"bus.{bus.name}", what, bus.name, check=check or check_of(kind), is_now=is_now)

@@ -245,7 +245,7 @@ def _lacks(said: tuple[str, str]) -> tuple[bool, ...]:
     """Return what cause and details lack, the worst first; of several that lack as much the fullest comes."""
     main, rest = said
     has_remedy, is_timed = REMEDY in rest, rest.startswith(SINCE)
-    return not has_remedy, MORE in rest, has_remedy and not is_timed, not rest, MORE in main
+    return not has_remedy, has_remedy and not is_timed, MORE in rest, not rest, MORE in main
 
 
 class _Words(QScrollArea):
@@ -279,8 +279,8 @@ class _Words(QScrollArea):
 
     @property
     def room(self) -> QSize:
-        """Room for text, whether a scroll bar is beside it or not: what fits must not turn on that."""
-        return self.size() - QSize(self.verticalScrollBar().sizeHint().width(), 0)
+        """Room for text without a scroll bar, which what fits does not need, whether one is there or not."""
+        return self.maximumViewportSize()
 
 
 def set_button(button: QPushButton, text: str) -> None:

@@ -143,17 +143,20 @@ def in_window(check: str) -> str:
 
 def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts for less and less room: what to check stays longest, then the time."""
-    since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
+    since = said[0].partition(" · ")[0]
+    began, check = since.partition(", for ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
     bare = [ASIDE.sub("", one.partition(ALSO)[0]) for one in check]
     first = [f"{begun}{MORE}" for one in check for begun in _begun(one)]
     with_check = (
         said,
         [since, *said[1:]],
         [since, *check],
+        [began, *check],
         [since, *bare],
+        [began, *bare],
         check,
         bare,
-        *([since, one] for one in first),
+        *([begin, one] for one in first for begin in (since, began)),
     )
     shorter: tuple[list[str], ...] = (*with_check, *([one] for one in first), [since], [])
     return tuple(dict.fromkeys(map(" · ".join, shorter)))

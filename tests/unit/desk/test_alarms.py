@@ -424,7 +424,7 @@ def test_a_bus_that_is_full_now_is_an_alarm_and_is_over_when_it_is_not(bench: Be
     bench.station.take([BusesSeen((replace(FINE, load_percent=100.0),), time.monotonic_ns())])
     (one,) = bench.station.alarms.active
     assert (one.alarm.kind, one.alarm.is_now) == (Kind.BUS_FULL, True)
-    assert one.alarm.what == "it is full: 100 % of its time is taken"
+    assert one.alarm.what == "100 % of its time is taken"
     assert bench.station.mark.colour == "bad"
     bench.station.take([BusesSeen((FINE,), time.monotonic_ns())])
     assert kinds(bench.station) == []

@@ -172,9 +172,9 @@ def test_many_that_one_alarm_explains_are_named_in_one_line() -> None:
 
 def test_a_bus_is_told_of_in_its_alarms_own_line_before_and_after_it_is_found() -> None:
     full = replace(BUS, nodes=[HIP], load_percent=100.0)
-    line = "bus full: main: it is full: 100 % of its time is taken"
+    line = "bus full: main: 100 % of its time is taken"
     assert lines([full], told()) == [(True, line)]
-    alarm = Alarm(Kind.BUS_FULL, "bus.main", "it is full: 100 % of its time is taken", "main")
+    alarm = Alarm(Kind.BUS_FULL, "bus.main", "100 % of its time is taken", "main")
     assert Active(alarm, 0.0).alarm.line == line
     assert lines([full], told(alarm)) == [(True, line)]
 
