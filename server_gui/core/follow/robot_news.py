@@ -81,27 +81,35 @@ class RobotNews:
             self._drives[joint] = word
             if before is not None:
                 changed.setdefault((before, word), []).append(joint)
-        every = len(robot.names("joint"))
+        every, errors = len(robot.names("joint")), self._new_errors(robot)
         for (before, word), joints in changed.items():
             kind = NewsKind.FAULT if "fault" in word else NewsKind.STATE
             names = ", ".join(map(_spoken, joints))
             change = f"{before} → {word}"
             if len(joints) == every > FEW:
                 self._tell(kind, f"all {every} drives: {change}")
+            elif (
+                len(joints) == 1 and kind is NewsKind.FAULT and joints[0] in errors
+            ):  # one cause is one event
+                self._tell(kind, f"{names}: {errors.pop(joints[0])} ({change})", joints[0])
             elif len(joints) > FEW:  # the change first: names have no room where there is little
                 self._tell(kind, f"{len(joints)} of {every} drives: {change} ({names})")
             else:
                 self._tell(kind, f"{names}: {change}")
-        self._look_at_errors(robot)
+        for joint, text in errors.items():
+            self._tell(NewsKind.FAULT, f"{_spoken(joint)}: {text}", joint)
 
-    def _look_at_errors(self, robot: Robot) -> None:
+    def _new_errors(self, robot: Robot) -> dict[str, str]:
+        """Return in words the error of each joint that has another than before."""
+        found = {}
         for joint in robot.names("joint"):
             code = robot.values.get(f"{joint}.error_code")
             if code is None or code == self._errors.get(joint, 0.0):
                 continue
             self._errors[joint] = code
             if code:
-                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: {error_text(int(code))}", joint)
+                found[joint] = error_text(int(code))
+        return found
 
 
 def _spoken(name: str) -> str:

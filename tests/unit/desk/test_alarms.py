@@ -288,6 +288,18 @@ def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
     ]
 
 
+def test_a_fault_and_its_error_are_one_event(bench: Bench) -> None:
+    told: list[str] = []
+    news = RobotNews(lambda _kind, text, _about="": told.append(text))
+    for state, code in ((4.0, 0.0), (7.0, float(0x2310))):
+        row: dict[str, list[float | None]] = {"left_knee.state": [state], "left_knee.error_code": [code]}
+        bench.station.take([telemetry([time.monotonic_ns()], row)])
+        news.look(bench.station.robot)
+    (one,) = [text for text in told if "left knee" in text]
+    assert one.startswith("left knee: 0x2310 ")
+    assert one.endswith(" (operation enabled → fault)")
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
