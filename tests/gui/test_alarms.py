@@ -19,11 +19,9 @@ from gateway.client import ConnectionState, NotConnected
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.texts import Kind
-from server_gui.core.commissioning.stages import LOOKS, Stage
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
-from server_gui.views.alarms.words import REMEDY
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
@@ -449,76 +447,3 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     bench.look_again([looked(state="lost", problem="gone")])
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.mark.word == "lost"
-
-
-def test_the_list_of_alarms_is_no_higher_than_its_rows(window: MainWindow, bench: Bench) -> None:
-    window.resize(1920, 1000)
-    fault(bench)
-    settle(window, bench)
-    window.alarms.list.turn()
-    settle(window, bench)
-    assert window.alarms.list.height() < window.height() / 2
-    assert rules.cut_words(window, [row.headline for row in window.alarms.list.rows]) == []
-
-
-def test_how_to_go_on_after_a_stop_is_whole_before_it_is_said_who_has_stopped(
-    window: MainWindow, bench: Bench, theme: Theme
-) -> None:
-    """With large text it ended in an ellipsis, below a line about the address of this window."""
-    theme.set(scale=1.5)
-    window.resize(1024, 700)
-    bench.station.take([walking(10), looked()])
-    stopping = bench.station.stopping
-    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
-    stopping.described(held=True, reason="STOP button of the window, by gwrms gui (127.0.0.1:46564)")
-    bench.draw(window)
-    assert "confirmed by all 6 drives" in window.alarms.headline.text()
-    said = window.alarms.details.text()
-    assert said.startswith("since ")
-    assert said.endswith("then enable the drives: start the robot's controller again")
-
-
-def test_what_to_check_has_room_before_the_register_of_a_code(
-    window: MainWindow, bench: Bench, theme: Theme
-) -> None:
-    theme.set(scale=1.5)
-    window.resize(1024, 700)
-    fault(bench)
-    bench.draw(window)
-    assert CAUSE.partition(" (")[0] in window.alarms.headline.text()
-    said = window.alarms.details.text()
-    assert said.startswith("since ")
-    assert REMEDY in said
-
-
-@pytest.mark.parametrize("stage", [Stage.STOPPED, Stage.NOT_CONFIRMED, Stage.MOVING])
-def test_what_is_wrong_with_a_robot_that_is_commissioned_is_told_where_there_is_no_alarm(
-    around: Around, bench: Bench, stage: Stage
-) -> None:
-    bench.station.take([walking(300), looked()])
-    around.alarms.commissioned = lambda: ("exo-09", LOOKS[stage])
-    settle(around, bench)
-    assert around.alarms.headline.text() == f"exo-09 · {LOOKS[stage].mark.word}"
-    assert around.alarms.property("tone") == LOOKS[stage].mark.colour
-    around.alarms.commissioned = lambda: ("exo-09", LOOKS[Stage.WORKING])
-    settle(around, bench)
-    assert "exo-09" not in around.alarms.headline.text()
-
-
-def test_a_line_that_fits_without_a_scroll_bar_leaves_what_to_check_its_room(
-    around: Around, bench: Bench, theme: Theme
-) -> None:
-    """What to check was cut while one of three lines stood empty."""
-    theme.set(scale=1.5)
-    around.resize(1500, 900)
-    fault(bench)
-    settle(around, bench)
-    strip = around.alarms
-    told = strip.told[0][1].alarm
-    wide = strip.headline.fontMetrics().horizontalAdvance(told.line)
-    for _ in range(3):
-        around.resize(around.width() + wide + 6 - strip._words.maximumViewportSize().width(), 900)
-        settle(around, bench)
-    assert strip.headline.text() == told.line
-    assert strip.details.text().startswith("since ")
-    assert strip.details.text().endswith(told.check)

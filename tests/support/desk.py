@@ -25,6 +25,7 @@ from gateway.wire.resource import (
 )
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Resources, Telemetry
@@ -265,3 +266,8 @@ def resources(processes: Sequence[ProcessUse] | None = None) -> Resources:
             throttling=Throttling(0, {"fan": 0.0}, [1.0, 0.8]),
         )
     return Resources(snapshot, 1_500_000, time.monotonic_ns())
+
+
+def kinds(station: Station) -> list[Kind]:
+    """What alarms it has, the worst first."""
+    return [one.alarm.kind for one in station.alarms.active]

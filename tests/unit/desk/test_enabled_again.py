@@ -16,7 +16,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, LinkChanged
 from server_gui.core.tuning.stop import StopProgress, StopState
-from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 OFF = Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False)
@@ -38,10 +38,6 @@ def states(number: float | None, **others: float | None) -> Event:
     at_ns = time.monotonic_ns() + HOUR_NS
     columns = {f"{joint}.state": [others.get(joint, number)] for joint in JOINTS}
     return telemetry([at_ns], columns, at_ns)
-
-
-def kinds(station: Station) -> list[Kind]:
-    return [one.alarm.kind for one in station.alarms.active]
 
 
 def drives(station: Station) -> tuple[str, str]:

@@ -9,9 +9,8 @@ from gateway.wire.stop import Stopped
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.unconfirmed import remedy
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, LinkChanged
-from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
@@ -36,10 +35,6 @@ def states(number: float, **others: float) -> Event:
 
 def _link_lost(bench: Bench) -> None:
     bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
-
-
-def kinds(station: Station) -> list[Kind]:
-    return [one.alarm.kind for one in station.alarms.active]
 
 
 def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
