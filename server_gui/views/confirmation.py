@@ -1,13 +1,18 @@
 """A confirmation before something is done; never in the way of STOP."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
+from server_gui.views.widgets.free_place import free_place
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.visibility import is_seen
 
-WIDTH = 420
+WIDTHS: Final = (420, 500, 580, 700)  # of its words; the first for which there is room
+Watched = Sequence[QWidget]  # what is looked at while a question is answered
 
 
 class Question(QDialog):
@@ -28,7 +33,6 @@ class Question(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.words = PlainLabel(text)
         self.words.setWordWrap(True)
-        self.words.setMinimumWidth(WIDTH)
         self.cancel, self.act = QPushButton("Cancel"), QPushButton(action)
         self.act.setAutoDefault(False)
         self.field = field
@@ -55,6 +59,23 @@ class Question(QDialog):
         self._column.insertWidget(self._column.count() - 1, field)
         QWidget.setTabOrder(self.field or self.words, field)
 
+    def keep_in_sight(self, window: QWidget, watched: Sequence[Watched]) -> None:
+        """Lie over no STOP of the window, and over what is watched as little as can be, the first least."""
+        frame = window.frameGeometry().size() - window.size()  # a question has much the same
+        room = in_sight(window)
+        stops = window.findChildren(StopButton)
+        kept = [list(_seen(widgets)) for widgets in (stops, *watched)]
+        sizes = [self._fit(wide) + frame for wide in WIDTHS]
+        place = free_place(sizes, room, kept)
+        self._fit(WIDTHS[sizes.index(place.size())])
+        self.move(place.topLeft())
+
+    def _fit(self, wide: int) -> QSize:
+        """Fit it around words of at least this width, and return its size."""
+        self.words.setMinimumWidth(wide)
+        self.adjustSize()
+        return self.size()
+
 
 def ask(
     parent: QWidget,
@@ -63,12 +84,30 @@ def ask(
     action: str,
     do: Callable[[], None],
     field: QLineEdit | None = None,
+    watched: Sequence[Watched] = (),
 ) -> Question:
-    """Show a question; `do` is called when `action` is chosen. One of a title at a time."""
+    """Show a question; `do` is called when `action` is chosen. One of a title at a time.
+
+    It leaves every STOP in sight, and what is `watched`, the most important first.
+    """
     for known in parent.findChildren(Question):
         if known.windowTitle() == title and known.isVisible():
             known.raise_()
             return known
     question = Question(parent, title, text, action, do, field)
+    question.keep_in_sight(parent.window(), watched)
     question.show()
     return question
+
+
+def in_sight(window: QWidget) -> QRect:
+    """Return what of a window is on its screen."""
+    return window.frameGeometry() & window.screen().availableGeometry()
+
+
+def _seen(widgets: Iterable[QWidget]) -> Iterable[QRect]:
+    """Yield what of each is in sight, on the screen."""
+    for widget in widgets:
+        if is_seen(widget):
+            seen = widget.visibleRegion().boundingRect()
+            yield seen.translated(widget.mapToGlobal(QPoint(0, 0)))

@@ -33,7 +33,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.follow.frame_time import one_moment
 from server_gui.views.alarms.events_panel import EventsPanel
 from server_gui.views.alarms.strip import AlarmStrip
-from server_gui.views.confirmation import ask
+from server_gui.views.confirmation import Watched, ask
 from server_gui.views.experiments.bar import ExperimentBar
 from server_gui.views.frame.closing import COMMISSIONING
 from server_gui.views.frame.docks import Area, Docks
@@ -114,7 +114,7 @@ class MainWindow(QMainWindow):
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
-        self.header.reset.connect(lambda station: ask_reset(self, station))
+        self.header.reset.connect(lambda station: ask_reset(self, station, self._watched))
         # Rooms before what is in them: Qt styles all of a widget anew wherever it is put into another.
         self._middle = QWidget()
         self.setCentralWidget(self._middle)
@@ -123,7 +123,7 @@ class MainWindow(QMainWindow):
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
         self.alarms = AlarmStrip(desk, theme, self._pages)
-        self.alarms.cleared.connect(lambda station: ask_clear(self, station))
+        self.alarms.cleared.connect(lambda station: ask_clear(self, station, self._watched))
         self.alarms.shown.connect(self.show_around)
         self.alarms.resources.connect(self._show_resources)
         self.robots = RobotsPanel(desk, theme)
@@ -169,6 +169,13 @@ class MainWindow(QMainWindow):
         self._build()
         self._bind_keys()
         menu.setMenu(self._view_menu())
+
+    @property
+    def _watched(self) -> tuple[Watched, ...]:
+        """What is looked at before a stop is ended: what became of it, each drive, all of them, the rest."""
+        results = (self.header, self.alarms, self.stopped_all, self.others, *self.robots.cards)
+        each, all_of_them = self.tabs.overview.drives
+        return results, (each,), (all_of_them,), (self._bar,)
 
     def refresh(self) -> None:
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""

@@ -349,6 +349,11 @@ class Overview(QWidget):
             one.show_hover(at)
 
     @property
+    def drives(self) -> tuple[QWidget, QWidget]:
+        """What tells of each drive, and of all of them."""
+        return self._joints, self.now
+
+    @property
     def notes(self) -> list[str]:
         """What stands at the right of each card's title."""
         return [

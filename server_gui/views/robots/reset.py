@@ -1,6 +1,6 @@
 """Asks before a stop is ended or a fault cleared, and says what that does and how to go on."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from PySide6.QtWidgets import QWidget
 
@@ -11,18 +11,18 @@ from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.unconfirmed import enabled_again, remedy, silent_controllers
 from server_gui.core.desk.station import Station
-from server_gui.views.confirmation import Question, ask
+from server_gui.views.confirmation import Question, Watched, ask
 
 DOES = "Every drive is led to “switch on disabled”. None is enabled, and this moves nothing."
 
 
-def ask_reset(parent: QWidget, station: Station) -> Question:
-    """Ask whether a held stop is to be ended."""
+def ask_reset(parent: QWidget, station: Station, watched: Sequence[Watched] = ()) -> Question:
+    """Ask whether a held stop is to be ended, beside what is watched meanwhile."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
     held = f"{_unstopped(station)}{held}"
     text = f"{held}\n\n{DOES}\n\nAfterwards, {go_on(Kind.RESET, station.robot)}."
-    return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
+    return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station, watched)
 
 
 def _unstopped(station: Station) -> str:
@@ -36,15 +36,19 @@ def _unstopped(station: Station) -> str:
     return f"STOP NOT CONFIRMED: {why}. First {first}.\n\n"
 
 
-def ask_clear(parent: QWidget, station: Station) -> Question:
+def ask_clear(parent: QWidget, station: Station, watched: Sequence[Watched] = ()) -> Question:
     """Ask whether faults are to be cleared: what is enabled loses its torque by it."""
+
+    def failed(why: str) -> None:
+        _ask_again(parent, station, why, watched)
+
     more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
     check = go_on(Kind.RESET, station.robot)
     asked = "\n".join((f"Clear the fault of {station.title}?", *_faults(station)))
     text = f"{asked}\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
-    return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
+    return _asked(parent, title, text, "Clear fault", station, watched, failed)
 
 
 def _faults(station: Station) -> Iterator[str]:
@@ -68,14 +72,14 @@ def _states(station: Station) -> str:
     return f"{old}: {then}. Any that is enabled loses its torque."
 
 
-def _ask_again(parent: QWidget, station: Station, why: str) -> None:
+def _ask_again(parent: QWidget, station: Station, why: str, watched: Sequence[Watched]) -> None:
     """Report that the fault is still there: no success, even though no stop is held."""
 
     def again() -> None:
-        ask_clear(parent, station)
+        ask_clear(parent, station, watched)
 
     title = f"NOT cleared: the fault of {station.title}"
-    ask(parent, title, f"{why}.", "Clear fault again …", again)
+    ask(parent, title, f"{why}.", "Clear fault again …", again, watched=watched)
 
 
 def _asked(
@@ -84,12 +88,12 @@ def _asked(
     text: str,
     action: str,
     station: Station,
+    watched: Sequence[Watched],
     failed: Callable[[str], None] = lambda _: None,
 ) -> Question:
     """With no way to do what this desk may not."""
     why_not = station.refused(ROBOT_RESET)
-    question = ask(
-        parent, title, f"{why_not}.\n\n{text}" if why_not else text, action, lambda: station.reset(failed)
-    )
+    said = f"{why_not}.\n\n{text}" if why_not else text
+    question = ask(parent, title, said, action, lambda: station.reset(failed), watched=watched)
     question.act.setEnabled(not why_not)
     return question

@@ -1,0 +1,77 @@
+"""Questions lie beside what is looked at before they are answered."""
+
+import itertools
+
+import pytest
+from PySide6.QtCore import QPoint, QRect, QSize
+from PySide6.QtWidgets import QWidget
+
+from gateway.wire.stop import Stopped
+from server_gui.views.confirmation import Question
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.free_place import free_place
+from server_gui.views.widgets.stop_button import StopButton
+from tests.gui import rules
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import JOINTS, looked, walking
+
+ROOM = QRect(0, 0, 100, 100)
+SIZE = QSize(40, 40)
+HELD = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
+
+
+@pytest.mark.parametrize(
+    ("kept", "place"),
+    [
+        ([], (29, 60)),
+        ([[QRect(0, 90, 100, 10)]], (29, 50)),
+        ([[QRect(0, 50, 60, 50)]], (60, 60)),
+        ([[QRect(0, 0, 100, 100)], [QRect(0, 50, 100, 50)]], (29, 10)),
+        ([[QRect(0, 70, 100, 30)], [QRect(0, 0, 100, 69)]], (29, 30)),
+    ],
+)
+def test_a_place_covers_the_first_least_and_is_low(kept: list[list[QRect]], place: tuple[int, int]) -> None:
+    assert free_place([SIZE], ROOM, kept).topLeft().toTuple() == place
+
+
+def on_screen(widget: QWidget) -> QRect:
+    seen = widget.visibleRegion().boundingRect()
+    return seen.translated(widget.mapToGlobal(QPoint(0, 0)))
+
+
+def covered(question: Question, widgets: list[QWidget]) -> list[QWidget]:
+    taken = question.frameGeometry()
+    return [one for one in widgets if one.isVisible() and on_screen(one).intersects(taken)]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("size", [(1366, 768), (1024, 700)])
+def test_stops_their_results_and_the_joints_stay_in_sight_beside_the_question_of_a_reset(
+    window: MainWindow,
+    bench: Bench,
+    theme: Theme,
+    size: tuple[int, int],
+    scale: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server_gui.views.confirmation.in_sight", lambda _: window.geometry())
+    theme.set(scale=scale)
+    window.resize(*size)
+    bench.station.take([walking(300), looked(state="fault", problem="overcurrent, 0x2310")])
+    bench.station.stop("test")
+    bench.first.answer(HELD)
+    joints = window.tabs.overview._joints
+    for dock, ask in itertools.product(window.docks[:2], (window.header.reset, window.alarms.cleared)):
+        window.bring(dock)
+        for _ in range(3):
+            bench.draw(window)
+            rules.settle()
+        ask.emit(bench.station)
+        question = next(one for one in window.findChildren(Question) if one.isVisible())
+        results = [window.header, window.alarms, *window.robots.cards]
+        assert covered(question, [*window.findChildren(StopButton), *results]) == []
+        assert window.geometry().contains(question.geometry())
+        is_long = ask is window.alarms.cleared and scale > 1.0  # there is no room beside all of it
+        assert is_long or covered(question, [joints]) == []
+        destroy(question)
