@@ -111,11 +111,11 @@ def test_the_limits_of_a_replay_are_those_of_the_recording_and_never_of_the_live
     assert limits_at(6.0) == [40.0, -40.0]
 
 
-def to_the_fault(shown: Shown, archive: Archive, player: Player) -> None:
+def to_the_fault(shown: Shown, archive: Archive, player: Player, later_s: float = 2.0) -> None:
     """As its event in the bar leads there, and some seconds more."""
     tape = archive.playback.tape
     assert tape is not None
-    archive.playback.seek(tape.first_ns + round((FAULT_S + 2.0) * 1e9))
+    archive.playback.seek(tape.first_ns + round((FAULT_S + later_s) * 1e9))
     shown.until(lambda: player.alarms.told, "said what was wrong then")
 
 
@@ -177,6 +177,31 @@ def test_its_signal_is_shown_before_and_after_the_fault(
     at_s = (at_ns - newest_ns) / 1e9
     assert left == pytest.approx(at_s - 5.0, abs=0.2)
     assert right == pytest.approx(at_s + 5.0, abs=0.2)
+
+
+@pytest.mark.parametrize("high", [590, 900])
+def test_a_replay_stands_at_the_fault_whose_signals_are_shown_and_says_its_alarm(
+    shown: Shown, archive: Archive, player: Player, high: int
+) -> None:
+    shown.window.resize(660, high)
+    player.labelling.setChecked(False)
+    to_the_fault(shown, archive, player, 0.02)
+    (_, alarm), *_ = player.alarms.told
+    assert alarm.at_ns is not None
+    player.show_around("left_knee.current", alarm.at_ns)
+    shown.until(lambda: player.signals.scene.frozen, "stood still at it")
+    shown.draw()
+    playback, tape, signals = archive.playback, archive.playback.tape, player.signals
+    assert tape is not None
+    assert (playback.position_ns - tape.first_ns) / 1e9 == pytest.approx(FAULT_S, abs=0.05)
+    assert player.alarms.isVisible()
+    assert "left knee" in player.alarms.headline.text()
+    frozen, jumped_ns = signals.scene.frozen, signals._jumped_ns
+    assert frozen is not None
+    assert jumped_ns is not None
+    assert frozen.newest_ns - jumped_ns == pytest.approx(5e9, abs=2e8), "what comes after it is kept"
+    assert signals._read_s == (jumped_ns - frozen.newest_ns) / 1e9, "values are those at it"
+    assert any(flag.kind is FlagKind.FAULT for flag in signals._jumped_flags)
 
 
 def test_clock_and_alarm_are_of_the_instant_that_a_jump_leads_to(

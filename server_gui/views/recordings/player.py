@@ -183,7 +183,10 @@ class Player(QWidget):
         self._choice.button(SIGNALS).click()
 
     def show_around(self, channel: str, at_ns: int) -> None:
-        """Show what explains a channel before and after an instant: what comes after it is read first."""
+        """Show what explains a channel before and after an instant: what comes after it is read first.
+
+        Then the recording stands at that instant: values and alarms are of it.
+        """
         robot = self._playback.desk.stations[0].robot
         if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
             self._playback.play(on=False)
@@ -198,10 +201,7 @@ class Player(QWidget):
         if playback.tape is None:
             return
         if self._around is not None and not playback.is_loading:
-            (channel, at_ns), self._around = self._around, None
-            self.signals.refresh()
-            description = playback.desk.stations[0].robot.description
-            self.signals.show_around(explaining_signals(description, channel), at_ns)
+            self._stand_at(*self._around)
         self._refresh_beside()
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)
@@ -210,6 +210,16 @@ class Player(QWidget):
         shown = playback.playing or (playback.position_ns, playback.is_loading)
         if self._pace.is_due((playback.tape, shown)):
             self._refresh_words()
+
+    def _stand_at(self, channel: str, at_ns: int) -> None:
+        """Let the plots keep what is around an instant, and go back to the first row that shows it."""
+        self._around, robot = None, self._playback.desk.stations[0].robot
+        self.signals.refresh()
+        self.signals.show_around(explaining_signals(robot.description, channel), at_ns)
+        if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
+            a_row_ns = round(SECOND_NS / robot.rows_per_s) if robot.rows_per_s else 0
+            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + a_row_ns)
+            self._playback.step()
 
     def _refresh_beside(self) -> None:
         """Bring the second recording into the plots once it is there."""
@@ -358,7 +368,8 @@ class Player(QWidget):
             self._make_room()
             self.overview.read_now()  # its joints come first from now on
             self.overview.refresh()
-        is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
+        is_low = not self._is_roomy and self._stack.currentIndex() == SIGNALS
+        is_in_the_way = is_low and not self.alarms.told
         self.alarms.setVisible(self._was_wrong and not is_in_the_way)
 
     def _refresh_flags(self) -> None:

@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.measuring import measure, nearest, row_at
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import default_file
@@ -76,6 +77,7 @@ class Signals(QWidget):
         self.area.hovered.connect(self._hovered)
         self._begun, self._pace = False, RefreshRate()
         self._jumped_ns: int | None = None  # on the robot's clock
+        self._jumped_flags: list[Flag] = []  # what had happened in what was kept then
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
@@ -147,7 +149,7 @@ class Signals(QWidget):
             set_tip(self.said, self.said.text())
             self._say_more()
             self._flag(station)
-            read(self.scene, self.cards, station, self._hover)
+            read(self.scene, self.cards, station, self._read_s)
             if self.cursors.isChecked():
                 self._measure()
 
@@ -315,7 +317,7 @@ class Signals(QWidget):
             plot.plot.set_seconds(self._seconds)
 
     def _paused(self, on: bool) -> None:
-        self._jumped_ns, self._is_gone = None, False
+        self._jumped_ns, self._jumped_flags, self._is_gone = None, [], False
         self.scene.go_on()
         if on:
             self.scene.freeze()
@@ -340,7 +342,15 @@ class Signals(QWidget):
         for plot in self.plots:
             plot.plot.show_hover(at_s)
         if self._desk.selected is not None:
-            read(self.scene, self.cards, self._desk.selected, at_s)
+            read(self.scene, self.cards, self._desk.selected, self._read_s)
+
+    @property
+    def _read_s(self) -> float | None:
+        """The time that is read, s until the newest row: of the pointer, else of what one has jumped to."""
+        newest_ns = self.scene.newest_ns
+        if self._hover is not None or self._jumped_ns is None or newest_ns is None:
+            return self._hover
+        return (self._jumped_ns - newest_ns) / 1e9
 
     def _note(self) -> None:
         """Ask for a note of the instant at the active cursor, else of the newest row."""
@@ -400,6 +410,7 @@ class Signals(QWidget):
         self.span.setCurrentIndex(wanted % len(SPANS_S))
         self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
         self._jumped_ns = stamp_ns
+        self._jumped_flags = list(self._desk.selected.flags)
         self.read_now()
         return True
 
@@ -423,7 +434,8 @@ class Signals(QWidget):
             return
         begin_ns = newest_ns - round(SPANS_S[-1] * 1e9)
         noted = [one for one in self._notes.flags() if begin_ns <= one.at_ns <= newest_ns]
-        found = [*station.flags.between(begin_ns, newest_ns + 1), *noted]
+        known = dict.fromkeys([*self._jumped_flags, *station.flags.between(begin_ns, newest_ns + 1)])
+        found = [*known, *noted]
         flag(self.scene, self.cards, [*found, *([] if triggered is None else [triggered])], newest_ns)
         for button in (self.tools.before, self.tools.next):
             button.setEnabled(bool(len(station.flags)))
