@@ -12,6 +12,7 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from gateway.units import Units
 from server_gui.core.desk.measuring import Measured, measure, nearest, row_at
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Curve, Plot
@@ -87,6 +88,13 @@ def test_the_nearest_row_is_found() -> None:
     times = np.array([-0.3, -0.2, -0.1, 0.0])
     assert [nearest(times, at) for at in (-9.0, -0.26, -0.24, -0.1, 9.0)] == [0, 0, 1, 2, 3]
     assert nearest(np.zeros(0), 0.0) is None
+
+
+def test_a_difference_of_two_readings_is_that_of_what_is_shown(theme: Theme) -> None:
+    table = Measuring(theme)
+    table.show_readings(0.0, 1.0, 0, [("force", Units().unit("force", "N"), Measured(100.0049, 99.9951))])
+    assert [cell(table, 0, name) for name in ("A", "B", "B − A")] == ["100", "99.995", "−0.005"]
+    destroy(table)
 
 
 def test_what_is_missing_is_missing_and_the_rest_is_measured() -> None:

@@ -127,7 +127,8 @@ def test_each_has_a_name_and_a_colour_of_its_own_in_the_bar_in_plots_and_at_curs
     assert beside is not None
     legend = plot._legend.accessibleDescription()
     text = plot._text
-    difference = rounded((beside - here) * plot.unit.scale, plot._places, "+")
+    shown_here, shown_beside = (round(one * plot.unit.scale, plot._places) for one in (here, beside))
+    difference = rounded(shown_beside - shown_here, plot._places, "+")
     symbol = plot.unit.symbol
     assert legend == (f"{names[0]} {text(here)}, {names[1]} {text(beside)}, difference {difference} {symbol}")
     player.beside_bar.cursors.click()

@@ -14,6 +14,7 @@ from server_gui.core.prediction.state import TOO_LITTLE, WITHIN_DAYS, Quality
 
 OTHERS: Final = "other sessions"  # the verdict where each was judged by its own
 UNKNOWN: Final = "not labelled"
+PLACES: Final = 1  # of a percentage for people
 ALIKE: Final = 0.05  # percent: a difference that is not shown is none
 
 
@@ -54,10 +55,10 @@ class Row:
 
     @property
     def difference(self) -> float | None:
-        """One less the other, in percent points; none where these are figures of other sessions."""
-        if not self.is_verdict:
+        """One less the other as both are shown, in percent points; none where of other sessions."""
+        if not self.is_verdict or self.one is None or self.other is None:
             return None
-        return None if self.one is None or self.other is None else self.one - self.other
+        return round(self.one, PLACES) - round(self.other, PLACES)
 
     @property
     def verdict(self) -> str:
@@ -140,14 +141,14 @@ def usual_other(entry: Entry, found: Catalogue) -> Entry | None:
 
 def percent(value: float | None) -> str:
     """Return a percentage for people."""
-    return NONE if value is None else f"{value:.1f} %"
+    return NONE if value is None else f"{value:.{PLACES}f} %"
 
 
 def signed(value: float | None) -> str:
     """Return a difference in percent points."""
     if value is None:
         return NONE
-    return "±0.0" if abs(value) < ALIKE else with_minus(f"{value:+.1f}")
+    return "±0.0" if abs(value) < ALIKE else with_minus(f"{value:+.{PLACES}f}")
 
 
 def headline(card: Card) -> str:

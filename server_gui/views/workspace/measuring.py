@@ -58,8 +58,9 @@ class Measuring(Card):
             for table in (self.table, self.below):
                 table.setRowCount(len(rows))
         for place, (name, unit, found) in enumerate(rows):
-            values = (found.a, found.b, found.difference, found.low, found.high, found.mean, found.sd)
-            texts = (name, *(_text(unit, value) for value in values), unit.symbol)
+            ends, span = (found.a, found.b), (found.low, found.high, found.mean, found.sd)
+            said, more = ([_text(unit, value) for value in values] for values in (ends, span))
+            texts = (name, *said, _difference(unit, found), *more, unit.symbol)
             for column, text in enumerate(texts):
                 self._set(place, column, text)
         self._share()
@@ -140,4 +141,16 @@ def _table(name: str) -> QTableWidget:
 
 
 def _text(unit: Unit, value: float | None) -> str:
-    return "–" if value is None else with_minus(f"{value * unit.scale:.5g}")
+    return "–" if value is None else with_minus(_number(value * unit.scale))
+
+
+def _number(shown: float) -> str:
+    return f"{shown:.5g}"
+
+
+def _difference(unit: Unit, found: Measured) -> str:
+    """Return how much more it is at B, as both are shown."""
+    if found.a is None or found.b is None:
+        return "–"
+    a, b = (float(_number(value * unit.scale)) for value in (found.a, found.b))
+    return with_minus(_number(b - a))

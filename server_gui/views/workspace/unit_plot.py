@@ -120,9 +120,11 @@ class UnitPlot(TakesCurves):
     def _compared(
         self, value: float | None, other: float | None, curve: Curve, *, live: bool
     ) -> list[tuple[str, str, str]]:
-        """Return the value of what is beside, and how much more that is."""
-        more = None if value is None or other is None else other - value
-        said = "–" if more is None else rounded(more * self.unit.scale, self._places, "+")
+        """Return the value of what is beside, and how much more that is, as both are shown."""
+        said = "–"
+        if value is not None and other is not None:
+            before, after = (round(one * self.unit.scale, self._places) for one in (value, other))
+            said = rounded(after - before, self._places, "+")
         return [
             (self._ink(curve, live=live), BESIDE, f"{self._both[1]} {self._text(other)}"),
             (

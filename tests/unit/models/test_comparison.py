@@ -72,6 +72,11 @@ def test_more_f1_is_better_and_more_error_worse() -> None:
     assert both["On people never seen", "Says “unknown”"].verdict == "alike"
 
 
+def test_a_difference_is_that_of_the_figures_as_they_are_shown() -> None:
+    row = found(judged(0.90049, 0.9), judged(0.89951, 0.9))["On people never seen", "F1, mean over classes"]
+    assert (percent(row.one), percent(row.other), signed(row.difference)) == ("90.0 %", "90.0 %", "±0.0")
+
+
 def test_a_class_that_nobody_showed_has_no_figure_instead_of_zero() -> None:
     row = found(judged(0.9, 0.9), None)["By class, F1", "fall"]
     assert (row.one, row.other, row.decisions) == (None, None, 0)
