@@ -189,6 +189,7 @@ QComboBox::down-arrow {{ width: 0; height: 0; border-left: 4px solid {field}; bo
     border-top: 5px solid {text}; }}
 QComboBox::down-arrow:disabled {{ border-top-color: {old}; }}
 QMenu::item {{ padding: 5px 22px 5px 12px; }}
+QMenu::icon {{ left: 8px; }}
 QMenu::item:selected {{ background: {accent}; color: {on_accent}; }}
 QMenu::item:disabled {{ color: {old}; }}
 QAbstractItemView {{ background: {card}; alternate-background-color: {panel}; border: none;

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from typing import Any, Final
 
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.flags import (
     Entry,
@@ -43,13 +44,12 @@ class TimelineEvents:
         self._watch = StateWatch()
         self._look(tape, words, self._watch)
 
-    def tell(self, entries: Iterable[Entry]) -> None:
-        """Take entries of the robot's journal from the time of the recording."""
+    def tell(self, entries: Iterable[Entry], described: Iterable[ParameterInfo] = ()) -> None:
+        """Take entries of the robot's journal from the time of the recording, with its parameters."""
         if self._tape is not None:
             begin_ns, end_ns = self._tape.first_ns, self._tape.last_ns
-            self.flags.add(
-                *(flag for flag in of_recorded_journal(entries) if begin_ns <= flag.at_ns <= end_ns)
-            )
+            found = of_recorded_journal(entries, described)
+            self.flags.add(*(flag for flag in found if begin_ns <= flag.at_ns <= end_ns))
 
     @property
     def is_looking(self) -> bool:

@@ -31,7 +31,8 @@ class FlagWatch:
             case Telemetry():
                 yield from self._states.take(event.batch.stamps_ns, event.batch.columns, robot.state_words)
             case Journalled() if robot.description is not None:
-                yield from of_journal(event.journal.entries, robot.description.boot_id)
+                described = robot.description
+                yield from of_journal(event.journal.entries, described.boot_id, described.parameters)
             case BusesSeen():
                 found = self._buses.take(robot.buses, event.at_ns)
                 if newest_ns is not None:

@@ -5,11 +5,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from drivers.error_codes import error_text
+from gateway.units import Unit, Units, with_minus
+from gateway.wire.parameter import ParameterInfo
 from ml.store.labels import utc_ns
 from server_gui.core.recording.batching import EventKind
+from server_gui.core.tuning.edits import spoken
 
 Entry = Mapping[str, Any]
 KEPT: Final = 500
@@ -128,17 +131,21 @@ class StateWatch:
             before = self._last[channel] = value
 
 
-def of_journal(entries: Iterable[Entry], boot_id: str) -> Iterator[Flag]:
+def of_journal(
+    entries: Iterable[Entry], boot_id: str, described: Iterable[ParameterInfo] = ()
+) -> Iterator[Flag]:
     """Yield what a robot's journal tells of one boot, on the robot's clock."""
+    units = _units(described)
     for entry in entries:
         if entry.get("boot_id") == boot_id:
-            yield from _of_entry(entry, "monotonic_ns")
+            yield from _of_entry(entry, "monotonic_ns", units)
 
 
-def of_recorded_journal(entries: Iterable[Entry]) -> Iterator[Flag]:
+def of_recorded_journal(entries: Iterable[Entry], described: Iterable[ParameterInfo] = ()) -> Iterator[Flag]:
     """Yield what a recorded journal tells, in UTC."""
+    units = _units(described)
     for entry in entries:
-        yield from _of_entry(entry, "utc_ns")
+        yield from _of_entry(entry, "utc_ns", units)
 
 
 def of_events(events: Iterable[Entry]) -> Iterator[Flag]:
@@ -148,20 +155,26 @@ def of_events(events: Iterable[Entry]) -> Iterator[Flag]:
         yield Flag(utc_ns(event["utc"]), str(event.get("text") or kind.value), kind)
 
 
-def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
+def _units(described: Iterable[ParameterInfo]) -> dict[str, Unit]:
+    """Return the units that these parameters are shown in, by their names."""
+    known = Units()
+    return {info.name: known.unit(info.name.rpartition(".")[2], info.unit) for info in described}
+
+
+def _of_entry(entry: Entry, clock: str, units: Mapping[str, Unit]) -> Iterator[Flag]:
     kind, at_ns = _ENTRIES.get(str(entry.get("what"))), entry.get(clock)
     if kind is not None and isinstance(at_ns, int):
         trial = kind is FlagKind.WRITE and entry.get("trial_s") is not None
-        yield Flag(at_ns, _said(entry), FlagKind.TRIAL if trial else kind)
+        yield Flag(at_ns, _said(entry, units), FlagKind.TRIAL if trial else kind)
 
 
-def _said(entry: Entry) -> str:
+def _said(entry: Entry, units: Mapping[str, Unit]) -> str:
     """Return who did what, and why: the parameters of a write, the reason of a stop."""
     after, what, who = entry.get("after"), str(entry.get("what")), entry.get("who")
     before = entry.get("before")
     was = before if isinstance(before, Mapping) else {}
     about = (
-        ", ".join(_changed(name, was.get(name), after[name]) for name in after)
+        ", ".join(_changed(str(name), was.get(name), after[name], units) for name in after)
         if isinstance(after, Mapping)
         else ""
     )
@@ -172,10 +185,23 @@ def _said(entry: Entry) -> str:
     return ": ".join(filter(None, (" ".join(filter(None, (what, about, by))), why)))
 
 
-def _changed(name: str, before: object, after: object) -> str:
-    """Return a parameter with its old and its new value, as far as these are numbers or words."""
-    told = [f"{value:g}" if isinstance(value, float) else str(value) for value in (before, after)]
-    return str(name) if before is None else f"{name} {told[0]} → {told[1]}"
+def _changed(name: str, before: object, after: object, units: Mapping[str, Unit]) -> str:
+    """Return a parameter with its old and its new value, as far as these are numbers or words.
+
+    In its unit, by the name for people, where that is known.
+    """
+    unit = units.get(name)
+    told = [_value(value, unit) for value in (before, after)]
+    if unit is None:
+        return name if before is None else f"{name} {told[0]} → {told[1]}"
+    return spoken(name) if before is None else f"{spoken(name)} {told[0]} → {told[1]} {unit.symbol}".rstrip()
+
+
+def _value(value: object, unit: Unit | None) -> str:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if unit is not None and is_number:
+        return with_minus(unit.editable(float(cast("float", value))))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _by(who: str) -> str:

@@ -390,7 +390,7 @@ class Player(QWidget):
         if kept is not None and self._told.get(playback) != told:
             self._told[playback] = told
             entries = [entry for stretch in kept.stretches for entry in stretch]
-            playback.happened.tell(entries)
+            playback.happened.tell(entries, playback.parameters.described)
             playback.parameters.tell(entries, tape.first_ns, tape.last_ns)
 
     def _list_events(self, menu: QMenu) -> None:

@@ -1,6 +1,7 @@
 """What has happened is found in rows, in the journal and among a recording's events, once each."""
 
 import datetime
+import math
 import time
 from types import SimpleNamespace
 from typing import cast
@@ -10,6 +11,7 @@ import msgspec
 from drivers.error_codes import error_text
 from gateway.client import ConnectionState, NotConnected
 from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.wire.parameter import ParameterInfo
 from gateway.wire.stop import Stopped
 from server_gui.core.desk.flags import (
     Flag,
@@ -97,6 +99,17 @@ def test_what_a_window_wrote_is_told_without_its_port() -> None:
         "write gait.step 400 → 420 from the window",
         "write gait.step 400 → 420 from the window on 10.0.0.7",
     ]
+
+
+def test_a_write_is_told_in_the_unit_that_its_parameter_is_shown_in() -> None:
+    described = [
+        ParameterInfo(name, unit, None, None, None, True, None, "gait", "0x2001:0", "rw", False)
+        for name, unit in (("gait.step_length", "m"), ("left_hip.offset", "rad"))
+    ]
+    before = {"gait.step_length": 0.4, "left_hip.offset": 0.0}
+    after = {"gait.step_length": 0.43, "left_hip.offset": -math.pi / 2}
+    (flag,) = of_journal([entry("write", 5, before=before, after=after)], "b", described)
+    assert flag.text == "write step length (gait) 400 → 430 mm, offset (left hip) 0 → −90 °"
 
 
 def test_a_trial_that_the_robot_took_back_is_told_with_why() -> None:
