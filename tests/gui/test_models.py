@@ -373,3 +373,24 @@ def test_a_copy_that_has_learned_from_the_wearer_is_told_with_since_when_and_how
     page._show_learned()
     assert "window, Overview: Take back" in page.learned.text()
     destroy(page)
+
+
+def is_in_sight(button: QPushButton) -> bool:
+    return button.visibleRegion().boundingRect() == button.rect()
+
+
+def test_what_decides_is_in_sight_as_soon_as_it_is_asked_on_a_small_screen(
+    whole: Shown, both: tuple[Card, Card], theme: Theme
+) -> None:
+    theme.set(scale=1.5)
+    whole.window.resize(1024, 700)
+    page, (_, other) = opened(whole), both
+    choose(whole, page, other)
+    click(page.promote)
+    whole.until(page.confirm.isVisible, "asked")
+    for button in (page.confirm.yes, page.confirm.no):
+        whole.until(lambda button=button: is_in_sight(button), "scrolled to the decision")
+    click(page.confirm.no)
+    whole.until(lambda: not page.confirm.isVisible(), "changed nothing")
+    click(page.new)
+    whole.until(lambda: is_in_sight(page.form.begin), "scrolled to what begins it")

@@ -6,6 +6,7 @@ from server_gui.core.models.changes import ModelChange
 from server_gui.core.models.models import Models
 from server_gui.views.widgets.card import Card, set_primary, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.scroll_area import bring_into_sight
 
 
 class Confirm(Card):
@@ -54,6 +55,7 @@ class Confirm(Card):
             set_primary(self.no, bool(change.lost))
             self.why.clear()
             self.no.setFocus()
+            bring_into_sight(self.yes)
 
 
 def _does(change: ModelChange) -> str:

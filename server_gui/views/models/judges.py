@@ -38,10 +38,10 @@ class Judges(QTreeWidget):
         """The wearers that are checked, or sessions without one's name."""
         return tuple(item.text(NAME) for item in self._items() if _is_checked(item))
 
-    def show_lessons(self, lessons: Lessons) -> None:
-        """Show a row for each wearer."""
+    def show_lessons(self, lessons: Lessons) -> bool:
+        """Show a row for each wearer; return whether they are others than before."""
         if lessons.each == self._shown:
-            return
+            return False
         checked = set(self.chosen)
         self._shown = lessons.each
         self.clear()
@@ -51,6 +51,7 @@ class Judges(QTreeWidget):
         height = rows * max(self.sizeHintForRow(0), self._theme.px(20)) + 2 * self.frameWidth()
         self.setFixedHeight(height + self.header().sizeHint().height())
         self._fit()
+        return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

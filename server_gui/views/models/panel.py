@@ -155,7 +155,7 @@ class ModelsPage(QWidget):
     def _show_form(self, on: bool) -> None:
         self.form.setVisible(on)
         if on:
-            bring_into_sight(self.form)
+            bring_into_sight(self.form.begin)
 
     def _choose_trained(self) -> None:
         """Show a model trained here next, once."""

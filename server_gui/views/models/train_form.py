@@ -15,6 +15,7 @@ from server_gui.views.models.judges import Judges
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.scroll_area import bring_into_sight
 
 ABOUT: Final = (
     "It learns from every session with labels, in a process of its own, and is judged by wearers whom it has "
@@ -77,7 +78,8 @@ class TrainForm(Card):
             return
         self._models.look_for_lessons(str(self.task.currentData()), str(self.robot.currentData()))
         lessons = self._models.lessons
-        self.judges.show_lessons(lessons or Lessons())
+        if self.judges.show_lessons(lessons or Lessons()):
+            bring_into_sight(self.begin)  # which more rows have moved down
         said, is_fine = _said(lessons, self.judges.chosen)
         set_text(self.said, said)
         set_tone(self.said, "" if is_fine else "warn")
