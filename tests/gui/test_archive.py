@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 
 from gateway.units import Units
 from gateway.wire.stop import Stopped
-from ml.store.sessions import Session
+from ml.store.sessions import UNREAD, Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import JobState
 from server_gui.core.desk.recording import By, Recording
@@ -26,6 +26,7 @@ from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.dock_title import DockTitle
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.recordings.sessions import NOTES
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.time_axis import SHOWN
@@ -78,6 +79,24 @@ def test_a_recording_that_goes_on_is_said_to_be_recorded_now_with_one_length(
     assert "Length: it goes on\n" in said
     assert "Its first 0:12.0 can be played by now" in said
     assert [page.table.model().index(0, column).data() for column in (2, 5)] == ["goes on", "recorded now"]
+
+
+def test_notes_of_a_recording_whose_store_is_away_stand_in_the_list_as_beside_it(
+    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
+) -> None:
+    name = record(settings)
+    shown.open("Recordings")
+    page = shown.window.tabs.recordings.list
+    shown.until(lambda: page.sessions.rowCount(), "listed it")
+    made = report()
+    link = msgspec.structs.replace(made.robots["exo-01"], session=name, notes="new insoles")
+    keeper = FakeKeeper(msgspec.structs.replace(made, robots={"exo-01": link}))
+    page._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+    page._recording.look()
+    page.sessions.take([msgspec.structs.replace(archive.library.found.sessions[0], notes=UNREAD)])
+    shown.draw()
+    shown.draw()
+    assert page.sessions.index(0, NOTES).data() == "new insoles"
 
 
 def test_the_list_says_that_the_store_is_away_before_its_first_frame(

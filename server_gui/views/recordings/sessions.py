@@ -68,16 +68,32 @@ class SessionModel(RowsModel[Session]):
         super().__init__(TITLES, lambda session: (session.robot, session.session), NUMBERS | {0})
         self._theme = theme
         self.recorded: frozenset[str] = frozenset()  # the sessions that are recorded now
+        self._words: dict[str, Session] = {}  # by session, where the store that has these is not reached
+
+    def show_words(self, words: dict[str, Session]) -> None:
+        """Show of these what people said of them, which the store would tell."""
+        if words != self._words:
+            self._words = words
+            self._change_all()
 
     def show_recorded(self, recorded: frozenset[str]) -> None:
         """Show that these are recorded now."""
         if recorded != self.recorded:
             self.recorded = recorded
-            last = self.index(max(self.rowCount() - 1, 0), len(TITLES) - 1)
-            self.dataChanged.emit(self.index(0, 0), last)
+            self._change_all()
+
+    def _change_all(self) -> None:
+        last = self.index(max(self.rowCount() - 1, 0), len(TITLES) - 1)
+        self.dataChanged.emit(self.index(0, 0), last)
+
+    def _with_words(self, session: Session) -> Session:
+        said = self._words.get(session.session)
+        if said is None:
+            return session
+        return msgspec.structs.replace(session, operator=said.operator, notes=said.notes)
 
     def data(self, index: Index, role: int = 0) -> Any:
-        session, column = self.rows[index.row()], index.column()
+        session, column = self._with_words(self.rows[index.row()]), index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 return plain(_cells(session, is_now=session.session in self.recorded)[column])
@@ -215,6 +231,8 @@ class SessionsPage(QWidget):
         report = self._recording.report
         links = {} if report is None or report.is_paused else report.robots
         self.sessions.show_recorded(frozenset(link.session for link in links.values() if link.session))
+        unread = (one for one in self.sessions.rows if one.notes == UNREAD)
+        self.sessions.show_words({one.session: said for one in unread if (said := self._words(one))})
 
     @property
     def chosen(self) -> Session | None:
