@@ -78,6 +78,24 @@ def test_once_a_drive_has_failed_its_row_is_seen_on_a_low_screen(
     assert table.visibleRegion().contains(place), "it has to be scrolled to"
 
 
+def test_pages_of_a_replay_keep_their_names_and_order_as_an_alarm_comes(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    def names() -> list[str]:
+        buttons = player.overview.sections.buttons
+        return [one.text().lstrip("■▲ ").partition(":")[0] for one in buttons if not one.isHidden()]
+
+    shown.window.resize(660, 590)
+    player.labelling.setChecked(False)
+    shown.until(lambda: len(names()) > 1, "arranged its pages")
+    before = names()
+    assert not player.overview._joints.isVisible(), "it begins with how the walk looked"
+    to_the_fault(shown, archive, player)
+    shown.draw()
+    assert player.overview._joints.isVisible()
+    assert names() == before
+
+
 def test_the_limits_of_a_replay_are_those_of_the_recording_and_never_of_the_live_robot(
     shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:

@@ -27,7 +27,6 @@ from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.sections import (
     ALL,
     NUMBERS_FIRST,
-    PICTURES_FIRST,
     Page,
     Section,
     SectionBar,
@@ -98,7 +97,8 @@ class Overview(QWidget):
         self._desk = desk
         self._theme = theme
         self._read_ns: int | None = None  # when what is read was last shown
-        self.is_numbers_first = True  # where not all is seen at once
+        self.is_numbers_first = True  # where not all is seen at once; else it begins with pictures
+        self.arrangements = NUMBERS_FIRST  # of its sections, whatever it begins with
         self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
@@ -170,9 +170,16 @@ class Overview(QWidget):
             is_low, pages = self._is_too_low(), self._fitting_pages()
             if is_low is not self._is_low or pages != self._pages:
                 self._is_low, self._pages = is_low, pages
-                is_kept = is_first is self._was_first and self._page in pages
-                self._page, self._was_first = self._page if is_kept else pages[0], is_first
+                self._page = self._page if self._page in pages else self._first_of(pages)
                 self._arrange(self._fitting)
+        if is_first is not self._was_first:
+            self._was_first = is_first
+            self._page = self._first_of(self._pages)
+            self._arrange(self._fitting)
+
+    def _first_of(self, pages: tuple[Page, ...]) -> Page:
+        """Return the page that it begins with."""
+        return pages[0 if self.is_numbers_first else -1]
 
     def _reserve_lines(self) -> None:
         """Keep room for all lines below the ring where the plots have theirs all the same; else for one."""
@@ -196,10 +203,9 @@ class Overview(QWidget):
         seen = self.parentWidget()
         if seen is None:
             return ALL
-        offered = NUMBERS_FIRST if self.is_numbers_first else PICTURES_FIRST
         gain = self.now.gain if self._columns > 1 else 0
         bar, between = self.sections.sizeHint().height() - gain, self._grid.verticalSpacing()
-        return arranged(self._needs(), seen.height() - self._around, bar, between, offered)
+        return arranged(self._needs(), seen.height() - self._around, bar, between, self.arrangements)
 
     @property
     def _around(self) -> int:

@@ -1,6 +1,6 @@
 """Sections of the overview, and the pages that they are on where not all of them have room."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from enum import Enum
 from typing import Final
 
@@ -32,7 +32,7 @@ NUMBERS_FIRST: Final[Arrangements] = (
     (JOINTS, WEARER | PLOTS),
     (JOINTS, WEARER, PLOTS),
 )
-PICTURES_FIRST: Final[Arrangements] = (ALL, (WEARER | PLOTS, JOINTS), (PLOTS, WEARER, JOINTS))
+REPLAYED: Final[Arrangements] = (ALL, (JOINTS, WEARER | PLOTS), (JOINTS, WEARER, PLOTS))  # of a recording
 HINT: Final = "Not all of the overview has room at once. Larger window, smaller text or F9: more of it"
 
 
@@ -47,10 +47,9 @@ def arranged(
     return offered[-1]
 
 
-def name_of(page: Page, pages: Sequence[Page]) -> str:
-    """Return what a page is called: by what is not on all of them."""
-    everywhere = frozenset.intersection(*pages)
-    return " and ".join(one.value for one in Section if one in page - everywhere).capitalize()
+def name_of(page: Page) -> str:
+    """Return what a page is called: by all that is on it."""
+    return " and ".join(one.value for one in Section if one in page).capitalize()
 
 
 class SectionBar(QFrame):
@@ -97,7 +96,7 @@ class SectionBar(QFrame):
             behind = [wrong[one] for one in Section if one in page - everywhere and one in wrong]
             names = [name for found, _ in behind for name in found]
             tone = max((tone for _, tone in behind), key=TONES.index, default="")
-            text = name_of(page, self._pages)
+            text = name_of(page)
             if names:
                 which = names[0] if len(names) == 1 else f"{len(names)} not ok"
                 text = f"{GLYPHS['square' if tone == 'bad' else 'triangle']} {text}: {which}"

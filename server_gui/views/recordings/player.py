@@ -35,6 +35,7 @@ from server_gui.core.workspace.alignment import Align
 from server_gui.core.workspace.workspace import PlotSpec
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
+from server_gui.views.overview.sections import REPLAYED
 from server_gui.views.predictions import STOPPED, UNSEEN, status
 from server_gui.views.recordings.beside_bar import BesideBar
 from server_gui.views.recordings.label_bar import LabelBar
@@ -85,6 +86,7 @@ class Player(QWidget):
         self._pace = RefreshRate()
         self._told: dict[Playback, object] = {}  # the recording and the journal that it knows of
         self.overview = Overview(self._playback.desk, theme)
+        self.overview.arrangements = REPLAYED
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked, until a drive fails
         notes = RecordedNotes(self._playback, archive.labels)
         self.beside = SideBySide(self._playback, archive.settings, archive.reading.do, archive.deliver)

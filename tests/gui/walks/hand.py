@@ -104,7 +104,8 @@ class Hand:
     def turn_to(self, section: str) -> None:
         """Show this section of the overview, where it is on a page of its own."""
         named = {one: one.lstrip("■▲✕ ").partition(":")[0] for one in self.names()}  # behind: what is wrong
-        wanted = (section, "Wearer and plots")
+        with_others = ("Joints and wearer", "Joints and plots", "Wearer and plots")
+        wanted = (section, *(page for page in with_others if section.lower() in page.lower()))
         button = next((one for one, page in named.items() if page in wanted), None)
         if button is not None:
             self.click(button, exactly=True)
