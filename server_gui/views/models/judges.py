@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QTreeWidget, QTreeWidgetItem
 
@@ -10,11 +10,14 @@ from gateway.plain_text import plain
 from server_gui.core.models.lessons import Lesson, Lessons
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
+from server_gui.views.widgets.elided import WrappingDelegate
 from server_gui.views.widgets.plain import tip
 
 TITLES: Final = ("Judged by", "Sessions", "Labelled")
 NAME, SESSIONS, LABELLED = range(len(TITLES))
 MOST: Final = 6  # rows that it has room for; more are scrolled
+AROUND: Final = 6  # pixels beside and around its text, at text of 100 %
+WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 NAMELESS: Final = "A session that does not say whose it is; gwrms label SESSION --wearer NAME does"
 
 
@@ -27,7 +30,8 @@ class Judges(QTreeWidget):
         self._shown: tuple[Lesson, ...] | None = None
         self.setHeaderLabels(TITLES)
         self.setRootIsDecorated(False)
-        self.setUniformRowHeights(True)
+        self._lines = WrappingDelegate(LABELLED)
+        self.setItemDelegate(self._lines)
         columns.prepare(self)
         self.itemClicked.connect(self._turn)
         self.itemActivated.connect(self._turn)
@@ -47,9 +51,6 @@ class Judges(QTreeWidget):
         self.clear()
         for lesson in lessons.each:
             self._add(lesson, checked=lesson.name in checked)
-        rows = min(max(len(lessons.each), 1), MOST)
-        height = rows * max(self.sizeHintForRow(0), self._theme.px(20)) + 2 * self.frameWidth()
-        self.setFixedHeight(height + self.header().sizeHint().height())
         self._fit()
         return True
 
@@ -86,8 +87,16 @@ class Judges(QTreeWidget):
         return [item for item in found if item is not None]
 
     def _fit(self) -> None:
-        px = self._theme.px
-        columns.fit(self, {LABELLED: px(120), NAME: px(110)})
+        """Share its width, names whole before all; what is labelled has the lines that it needs."""
+        columns.fit(self, {LABELLED: self._theme.px(120)})
+        around = self._theme.px(AROUND)
+        box = QRect(0, 0, max(self.columnWidth(LABELLED) - 2 * around, 1), 100_000)
+        for item in self._items():
+            said = self.fontMetrics().boundingRect(box, WRAPPED, item.text(LABELLED)).height()
+            item.setSizeHint(LABELLED, QSize(0, max(said + around, self._theme.px(20))))
+        shown = self._items()[:MOST]
+        high = sum(self.rowHeight(self.indexFromItem(item)) for item in shown) or self._theme.px(20)
+        self.setFixedHeight(high + 2 * self.frameWidth() + self.header().sizeHint().height())
 
 
 def _is_checked(item: QTreeWidgetItem) -> bool:
