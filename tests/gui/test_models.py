@@ -388,8 +388,7 @@ def test_what_decides_is_in_sight_as_soon_as_it_is_asked_on_a_small_screen(
     choose(whole, page, other)
     click(page.promote)
     whole.until(page.confirm.isVisible, "asked")
-    for button in (page.confirm.yes, page.confirm.no):
-        whole.until(lambda button=button: is_in_sight(button), "scrolled to the decision")
+    whole.until(lambda: all(map(is_in_sight, (page.confirm.yes, page.confirm.no))), "scrolled to it")
     click(page.confirm.no)
     whole.until(lambda: not page.confirm.isVisible(), "changed nothing")
     click(page.new)

@@ -59,8 +59,8 @@ class Measuring(Card):
                 table.setRowCount(len(rows))
         for place, (name, unit, found) in enumerate(rows):
             ends, span = (found.a, found.b), (found.low, found.high, found.mean, found.sd)
-            said, more = ([_text(unit, value) for value in values] for values in (ends, span))
-            texts = (name, *said, _difference(unit, found), *more, unit.symbol)
+            at_ends, more = ([_text(unit, value) for value in values] for values in (ends, span))
+            texts = (name, *at_ends, _difference(unit, found), *more, unit.symbol)
             for column, text in enumerate(texts):
                 self._set(place, column, text)
         self._share()
