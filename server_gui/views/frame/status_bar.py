@@ -102,7 +102,7 @@ class StatusBar(QStatusBar):
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
-        self.computer.say(*(("no robot", "") if station is None else (*_computer(station), "")))
+        self.computer.say(*(("no robot", "") if station is None else _computer(station)))
         mark, words = (LEVELS[BusHealthLevel.UNKNOWN], ("",)) if station is None else _bus(station)
         self._bus_icon.show_mark(mark)
         self._bus_icon.setVisible(station is not None)
