@@ -1,6 +1,6 @@
 """The main window: header with STOP, robots left, tabs in the middle, parameters right, events below."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, QTimer, Signal
@@ -23,7 +23,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.units import UNITS, Units
 from server_gui.core.alarms.explaining_signals import explaining_signals
 from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
@@ -46,6 +45,7 @@ from server_gui.views.frame.pages import Pages
 from server_gui.views.frame.recording_chip import ask_recording
 from server_gui.views.frame.saved_state import keep_bytes, kept_bytes
 from server_gui.views.frame.status_bar import StatusBar
+from server_gui.views.frame.view_choices import add_choices
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.predictions import activity
@@ -54,15 +54,11 @@ from server_gui.views.robots.others_bar import OthersBar
 from server_gui.views.robots.panel import HINT_ALL, RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.robots.stop_all_bar import StopAllBar
-from server_gui.views.theme import Look, Theme
-from server_gui.views.widgets.choice_menu import choices
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.visibility import has_focus_in, is_seen
 
-SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
-# Quantities with more than one unit worth choosing.
-CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
 EVENTS: Final = 2  # among the docks
 EVENTS_LIVE: Final = "Events, live"  # beside a recording that is played
 ROBOTS: Final = 9  # that have a key
@@ -444,25 +440,8 @@ class MainWindow(QMainWindow):
         recording.triggered.connect(lambda: ask_recording(self, self._desk.recording))
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
-        looks = {look.value.capitalize(): look for look in Look}
-        now = self._theme.look.value.capitalize()
-        choices(menu.addMenu("Colours"), list(looks), now, lambda text: self._theme.set(look=looks[text]))
-        sizes = {f"{percent} %": percent / 100 for percent in SCALES}
-        size = f"{round(self._theme.scale * 100)} %"
-        choices(menu.addMenu("Text size"), list(sizes), size, lambda text: self._theme.set(scale=sizes[text]))
-        units = menu.addMenu("Units")
-        for si in CHOICES:
-            symbols = [unit.symbol for unit in UNITS[si]]
-            chosen = self._desk.shown.units.unit("", si).symbol
-            choices(units.addMenu(f"{si} as"), symbols, chosen, self._unit_setter(si))
+        add_choices(menu, self._desk, self._theme)
         return menu
-
-    def _unit_setter(self, si: str) -> Callable[[str], None]:
-        def choose(symbol: str) -> None:
-            by_si = dict(self._desk.shown.units.by_si) | {si: symbol}
-            self._desk.shown.change(Units(by_si=by_si))
-
-        return choose
 
     def _restore(self) -> None:
         geometry = kept_bytes(self.kept, "geometry")

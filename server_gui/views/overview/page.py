@@ -10,20 +10,27 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
-from gateway.units import Unit, rounded
-from server_gui.core.alarms.severity import colour_of
 from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.marks import age_text, old_text
+from server_gui.views.marks import old_text
 from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
+from server_gui.views.overview.page_words import (
+    SIDES,
+    age_texts,
+    angle_texts,
+    legs_of,
+    load_texts,
+    placed_flags,
+    unwell_sensors,
+)
 from server_gui.views.overview.sections import (
     ALL,
     NUMBERS_FIRST,
@@ -51,7 +58,6 @@ from server_gui.views.widgets.colour_bar import ColourBar
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.gait_ring import GaitRing, meaning
 from server_gui.views.widgets.lines import Lines
-from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.pressure_map import PressureMap
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
@@ -66,7 +72,6 @@ PLOT: Final = 142  # high at least, likewise: 70 for its curves
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
 OFF_N: Final = 50.0  # a figure that is further off than its picture is read at once
-SIDES: Final = ("left", "right")
 PLOTS: Final = (
     PlotKind(
         "Knee angle",
@@ -329,8 +334,10 @@ class Overview(QWidget):
             self._model.refresh()
             self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
             joints = [joint for joint, _ in self._model.errors]
-            self.sections.say({Section.JOINTS: (joints, self._table.tone), Section.WEARER: _unwell(station)})
-            self._joints.set_note(*_age(station))
+            self.sections.say(
+                {Section.JOINTS: (joints, self._table.tone), Section.WEARER: unwell_sensors(station)}
+            )
+            self._joints.set_note(*age_texts(station))
 
     # --- one time for all plots
 
@@ -417,7 +424,7 @@ class Overview(QWidget):
         live = station.is_live
         if slow:
             angle = self._desk.shown.units.unit("position", "rad")
-            self._angles = {side: _angle_texts(pose, angle) for side, pose in legs.items()}
+            self._angles = {side: angle_texts(pose, angle) for side, pose in legs.items()}
         self._figure.show_pose(legs, values.get("trunk.tilt_forward"), wrong, self._angles, live=live)
         if slow:
             tilt = self._desk.shown.units.unit("tilt_forward", "rad")
@@ -453,8 +460,8 @@ class Overview(QWidget):
             if known != self._soles[side]:
                 self._soles[side] = known
                 self._maps[side].set_cells(known.cells)
-            wordings = _load_texts(side, carried[side], force)
-            self._loads[side].say(*wordings, widest=_load_texts(side, Load(WIDEST_N, None), force))
+            wordings = load_texts(side, carried[side], force)
+            self._loads[side].say(*wordings, widest=load_texts(side, Load(WIDEST_N, None), force))
             set_tone(self._loads[side], "" if live else "old")
             share = carried[side].share
             said = "–" if share is None else f"{100 * share:.0f} %"
@@ -464,48 +471,3 @@ class Overview(QWidget):
         sources = "; ".join(dict.fromkeys(known.source for known in self._soles.values()))
         count = f"{max(known.count for known in self._soles.values())} cells"
         self._pressure.set_note(*((sources, count, "") if live else old_text(station)))
-
-
-def _unwell(station: Station) -> tuple[list[str], str]:
-    """Return what of the wearer's sensors is not well, and how bad that is."""
-    joints = station.robot.names("joint")
-    names = [part.name for part in station.robot.not_ok() if part.name not in joints]
-    shown = [name for name in names if name.endswith("_insole") or name == "trunk"]
-    colours = {colour_of(name, station.alarms) for name in shown}
-    return [name.replace("_", " ") for name in shown], "bad" if "bad" in colours else "warn"
-
-
-def legs_of(station: Station) -> tuple[str, ...]:
-    """Return the sides of which the robot has a joint; both where that is not known."""
-    joints = station.robot.names("joint")
-    return tuple(side for side in SIDES if any(one.startswith(side) for one in joints)) or SIDES
-
-
-def placed_flags(station: Station, seconds: float) -> list[PlacedFlag]:
-    """Return what has happened within the last `seconds`, s until the newest row."""
-    newest_ns = station.rings.newest_ns
-    if newest_ns is None:
-        return []
-    found = station.flags.between(newest_ns - round(seconds * 1e9), newest_ns + 1)
-    return [PlacedFlag((flag.at_ns - newest_ns) / 1e9, flag.kind, flag.text) for flag in found]
-
-
-def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
-    """Return how much a foot carries, the fullest wording first."""
-    if load.problem or load.force is None:
-        return f"{side.upper()}  {load.problem or 'not known'}", f"{side[0].upper()}  –"
-    said = f"{force.text(load.force)} {force.symbol}"
-    return f"{side.upper()}  {said}", f"{side[0].upper()}  {said}"
-
-
-def _age(station: Station) -> tuple[str, ...]:
-    if not station.is_live:
-        return old_text(station)
-    return (f"age {age_text(station.robot.age_s())}",)
-
-
-def _angle_texts(pose: Pose, unit: Unit) -> list[str]:
-    digits = 0 if unit.symbol == "°" else 2
-    angles = (pose.hip, pose.knee, pose.ankle)
-    mark = unit.symbol if unit.symbol == "°" else ""
-    return ["–" if angle is None else f"{rounded(angle * unit.scale, digits, '+')}{mark}" for angle in angles]

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.flags import Flag
-from server_gui.core.desk.measuring import measure, nearest, row_at
+from server_gui.core.desk.measuring import nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import default_file
 from server_gui.core.workspace.exporting import save_csv
@@ -32,12 +32,13 @@ from server_gui.views.widgets.scroll_area import bring_into_sight
 from server_gui.views.widgets.split import Split
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree
-from server_gui.views.workspace.drawing import AnyPlot, columns, draw, flag, read
+from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
 from server_gui.views.workspace.layout_menu import LayoutMenu
 from server_gui.views.workspace.measuring import Measuring
 from server_gui.views.workspace.note import ask_note
 from server_gui.views.workspace.plot_area import PlotArea
+from server_gui.views.workspace.readings import readings, seconds_ago
 from server_gui.views.workspace.refusal import Refusal
 from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
@@ -88,8 +89,7 @@ class Signals(QWidget):
         self.channels.itemChanged.connect(self._ticked)
         self.channels.asked.connect(self.area.offer)
         self.channels.dragging.connect(self.area.offer_below)
-        self._words = QLineEdit()
-        self._words.setPlaceholderText("Filter channels")
+        self._words = QLineEdit(placeholderText="Filter channels")
         self._words.setAccessibleName("Filter of the channels")
         self._words.textChanged.connect(self.channels.show_only)
         self.measuring = Measuring(theme)
@@ -459,7 +459,7 @@ class Signals(QWidget):
 
     def _step(self, samples: int) -> None:
         """Move the active cursor by so many samples."""
-        times = self._times()
+        times = seconds_ago(self.scene, self._seconds)
         row = nearest(times, self._at[self._active])
         if row is not None:
             self._move(self._active, float(times[min(max(row + samples, 0), len(times) - 1)]))
@@ -471,23 +471,9 @@ class Signals(QWidget):
 
     def _measure(self) -> None:
         """Read every curve at the cursors, where there are samples, and over what is in sight."""
-        times, (left, right) = self._times(), self._window
-        if not len(times):
-            return
-        a, b = (row_at(times, cursor) for cursor in self._at)
-        first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
-        rows = [
-            (name, plot.unit, measure(values, a, b, int(first), int(last)))
-            for plot in self.plots
-            for text in plot.drawn
-            for name, values in columns(self.scene, text, self.scene.times(self._seconds))
-        ]
-        a_s, b_s = (s if at is None else float(times[at]) for s, at in zip(self._at, (a, b), strict=True))
-        self.measuring.show_readings(a_s, b_s, self._active, rows)
-
-    def _times(self) -> Floats:
-        times = self.scene.times(self._seconds)  # of the rows of the chosen span, s until the newest
-        return times - times[-1] if len(times) else times
+        found = readings(self.scene, self.plots, self._at, self._window, self._seconds)
+        if found is not None:
+            self.measuring.show_readings(found.a_s, found.b_s, self._active, found.rows)
 
     # --- what is said
 
