@@ -10,8 +10,9 @@ import pytest
 
 os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
-from PySide6.QtCore import QEventLoop, QSettings, QtMsgType, qInstallMessageHandler
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEventLoop, QSettings, Qt, QtMsgType, qInstallMessageHandler
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.frame.garbage import Garbage
@@ -69,6 +70,16 @@ def slots_raise_nothing(
     qt.processEvents(QEventLoop.ProcessEventsFlag.AllEvents)
     garbage.look()
     assert raised == []
+
+
+@pytest.fixture(autouse=True)
+def hands_off(qt: QApplication) -> Iterator[None]:
+    """Let go of mouse and keys: Qt remembers what the last event had, and with Shift a row is not chosen."""
+    yield
+    if qt.keyboardModifiers() or qt.mouseButtons():
+        QTest.mouseRelease(QWidget(), Qt.MouseButton.LeftButton)
+    assert qt.keyboardModifiers() == Qt.KeyboardModifier.NoModifier
+    assert qt.mouseButtons() == Qt.MouseButton.NoButton
 
 
 @pytest.fixture(scope="session")
