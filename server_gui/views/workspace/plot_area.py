@@ -50,6 +50,7 @@ class PlotArea(QFrame):
         self.below.setObjectName("banner")
         self.below.setProperty("tone", "plain")
         self.below.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._grid.addWidget(self.below, 1, 0, 1, COLUMNS)  # before it is hidden: else it has another's font
         self.below.hide()
         self.setAcceptDrops(True)
 
