@@ -67,16 +67,23 @@ def test_chips_never_overlap(bench: Bench, theme: Theme, header: Header, scale: 
     assert not broken, "\n".join(broken)
 
 
-@pytest.mark.parametrize(("width", "scale"), [(1024, 1.5), (1024, 1.0), (1366, 1.5), (1920, 1.0)])
-@pytest.mark.parametrize("state", [_walks, _link_lost, _fault])
-def test_age_and_recording_are_in_sight_beside_stop_however_large_the_text_is(
-    bench: Bench, theme: Theme, header: Header, state: Callable[[Bench], None], width: int, scale: float
+def _shown(
+    header: Header, bench: Bench, theme: Theme, state: Callable[[Bench], None], width: int, scale: float
 ) -> None:
+    """As the window shows it at this size."""
     theme.set(scale=scale)
     header.be_short(width < theme.px(1200))
     header.resize(width, header.height())
     _told(bench, state)
     header.refresh()
+
+
+@pytest.mark.parametrize(("width", "scale"), [(1024, 1.5), (1024, 1.0), (1366, 1.5), (1920, 1.0)])
+@pytest.mark.parametrize("state", [_walks, _link_lost, _fault])
+def test_age_and_recording_are_in_sight_beside_stop_however_large_the_text_is(
+    bench: Bench, theme: Theme, header: Header, state: Callable[[Bench], None], width: int, scale: float
+) -> None:
+    _shown(header, bench, theme, state, width, scale)
     shown = {name: chip.main_text for name, chip in header._chips.items() if chip.isVisible()}
     assert {"robot", "drives", "link", "recording"} <= shown.keys(), shown
     assert shown["recording"] in ("Not recording", "REC off")
@@ -89,11 +96,7 @@ def test_age_is_in_sight_beside_a_stop_that_is_not_confirmed(
     bench: Bench, theme: Theme, header: Header, state: Callable[[Bench], None], width: int, scale: float
 ) -> None:
     """There was none at all: the robot's chip had the room, and most of it empty."""
-    theme.set(scale=scale)
-    header.be_short(width < theme.px(1200))
-    header.resize(width, header.height())
-    _told(bench, state)
-    header.refresh()
+    _shown(header, bench, theme, state, width, scale)
     link, robot = header._chips["link"], header._chips["robot"]
     assert link.isVisible()
     assert "old" in f"{link.main_text} {link.detail_text}"

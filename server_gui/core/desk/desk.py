@@ -45,7 +45,7 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
-        self.left_running: list[str] = []  # in words: robots that were removed, and may be enabled
+        self.left_running: dict[str, str] = {}  # by address, in words: were removed, and may be enabled
         self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
@@ -93,8 +93,8 @@ class Desk:
         return len(self.stations) > 1 or self.commissions()
 
     def add(self, station: Station) -> None:
-        """Add a robot; the first is selected, and who adds one sees to those that were removed no more."""
-        self.left_running.clear()
+        """Add a robot; the first is selected, and one that was removed before is seen again."""
+        self.left_running.pop(station.address, None)
         self.stations.append(station)
         station.neighbours = self.stations
         if self.selected is None:
@@ -106,7 +106,7 @@ class Desk:
             left_as = _left_as(station)
             station.tell(NewsKind.CONTROL, f"removed {left_as}".rstrip())
             if left_as:
-                self.left_running.append(f"{station.title} was removed {left_as}")
+                self.left_running[station.address] = f"{station.title} was removed {left_as}"
         if self._stop_all is not None:
             self._stop_all.remove(station)
         self.stations.remove(station)

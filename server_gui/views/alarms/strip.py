@@ -156,7 +156,7 @@ class AlarmStrip(ClickableFrame):
     def _beside(self) -> tuple[Mark, str, str]:
         """Return what is no alarm of a robot here: of one that was removed or is commissioned, or none."""
         if left := self._desk.left_running:
-            return Mark("triangle", "warn", "removed"), "; ".join(left), LEFT_CHECK
+            return Mark("triangle", "warn", "removed"), "; ".join(left.values()), LEFT_CHECK
         commissioned = self.commissioned()
         if commissioned is not None and commissioned[1].mark.colour in ("warn", "bad"):
             name, look = commissioned
