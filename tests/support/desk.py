@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
+import pytest
 from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
@@ -271,3 +272,11 @@ def resources(processes: Sequence[ProcessUse] | None = None) -> Resources:
 def kinds(station: Station) -> list[Kind]:
     """What alarms it has, the worst first."""
     return [one.alarm.kind for one in station.alarms.active]
+
+
+def walking_bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    made = Bench(Desk())
+    made.add("exo-01").take([described(), walking(50), looked()])
+    return made

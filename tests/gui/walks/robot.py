@@ -183,7 +183,7 @@ def bus_in_trouble(bench: Bench) -> None:
     hand = bench.hand
     hand.click("Bus")
     bench.robot.break_("bus_load", "bus")
-    hand.sees(": main: it is ", "of its time is taken", within_s=AGAIN_S)
+    hand.sees("main: ", "of its time is taken", within_s=AGAIN_S)
     hand.keep("bus-full")
     bench.robot.mend()
     bench.robot.break_("bus_off", "left_knee")

@@ -18,13 +18,12 @@ from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES, Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk import station as station_module
-from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, Event, Journalled, LinkChanged, Looked
 from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot_news import RobotNews
-from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking, walking_bench
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -32,11 +31,7 @@ ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    made = Bench(Desk())
-    made.add("exo-01").take([described(), walking(50), looked()])
-    return made
+    return walking_bench(monkeypatch)
 
 
 def states(number: float, **others: float) -> Event:

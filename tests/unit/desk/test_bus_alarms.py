@@ -9,21 +9,16 @@ from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.alarms.texts import Kind
-from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import BusesSeen, Described, Looked
 from server_gui.core.follow.news import NewsKind
-from tests.support.desk import Bench, described, kinds, looked, walking
+from tests.support.desk import Bench, described, kinds, looked, walking, walking_bench
 
 FINE = BusInfo("main", "error active", 1_000_000, 41.0, 1010.0, 0, 0, 1, 0, [])
 
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    made = Bench(Desk())
-    made.add("exo-01").take([described(), walking(50), looked()])
-    return made
+    return walking_bench(monkeypatch)
 
 
 def test_a_bus_that_is_full_now_is_an_alarm_and_is_over_when_it_is_not(bench: Bench) -> None:

@@ -12,11 +12,10 @@ from server_gui.core.alarms.robot_alarms import HELD, undriven
 from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.alarms.unconfirmed import enabled_again, enabled_mark, remedy
 from server_gui.core.alarms.worst_state import STOP_SENT
-from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, LinkChanged
 from server_gui.core.tuning.stop import StopProgress, StopState
-from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, kinds, looked, telemetry, walking, walking_bench
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 OFF = Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False)
@@ -26,11 +25,7 @@ HEARD = {"n": 9, "what": "stop", "reason": "fell", "who": "ann"}
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    made = Bench(Desk())
-    made.add("exo-01").take([described(), walking(50), looked()])
-    return made
+    return walking_bench(monkeypatch)
 
 
 def states(number: float | None, **others: float | None) -> Event:

@@ -8,20 +8,15 @@ from gateway.client import ConnectionState, NotConnected
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.unconfirmed import remedy
-from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Event, LinkChanged
-from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, kinds, telemetry, walking, walking_bench
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    made = Bench(Desk())
-    made.add("exo-01").take([described(), walking(50), looked()])
-    return made
+    return walking_bench(monkeypatch)
 
 
 def states(number: float, **others: float) -> Event:

@@ -5,13 +5,12 @@ import time
 import pytest
 
 from gateway.wire.stop import Stopped
-from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Event
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.keys import Key
 from server_gui.terminal.marks import BAD, WARN
 from server_gui.terminal.panels import _drive
-from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, Bench, telemetry, walking_bench
 from tests.support.terminal_robot import screen
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -19,11 +18,7 @@ ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A robot that walks; what it has said gets old in a minute, on a busy computer as well."""
-    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    made = Bench(Desk())
-    made.add("exo-01").take([described(), walking(50), looked()])
-    return made
+    return walking_bench(monkeypatch)
 
 
 def seen(number: float) -> Event:
