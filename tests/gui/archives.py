@@ -47,13 +47,14 @@ def record(
 ) -> str:
     """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker.
 
-    From `fault_s` on the left knee's drive is in fault; with a `gap` rows were dropped in the middle.
+    From `fault_s` on the left knee's drive is in fault, and tells its code two rows later; with a `gap` rows
+    were dropped in the middle.
     """
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
     if fault_s is not None:
         fine = round(fault_s * RATE_HZ)
-        for name, before, then in (("state", 4.0, 7.0), ("error_code", 0.0, float(0x2310))):
-            values = (before if row < fine else then for row in range(len(walk.stamps_ns)))
+        for name, before, then, late in (("state", 4.0, 7.0, 0), ("error_code", 0.0, float(0x2310), 2)):
+            values = (before if row < fine + late else then for row in range(len(walk.stamps_ns)))
             walk.columns[f"left_knee.{name}"] = [*values]
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:

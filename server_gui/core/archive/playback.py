@@ -117,7 +117,7 @@ class PlayedRobot(Robot):
             if self.word(f"{part.name}.state") in FAULTS:
                 code = self.values.get(f"{part.name}.error_code")
                 state = "fault"
-                problem = "" if code is None else f"the drive is in fault: {error_text(int(code))}"
+                problem = f"the drive is in fault: {error_text(int(code))}" if code else ""
             elif part.name not in held and part.kind != "device":
                 state, problem = "lost", "the recording has no value of it here"
             self.parts[part.name] = replace(part, state=state, problem=problem)

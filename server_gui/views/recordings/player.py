@@ -69,6 +69,7 @@ READING: Final = "reading both recordings …"
 SETTLES: Final = 8  # frames until all plots are there
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)
+TOLD_NS: Final = SECOND_NS // 10  # after its state a drive tells why it is in fault
 
 
 class Player(QWidget):
@@ -214,13 +215,12 @@ class Player(QWidget):
             self._refresh_words()
 
     def _stand_at(self, channel: str, at_ns: int) -> None:
-        """Let the plots keep what is around an instant, and go back to the first row that shows it."""
+        """Let the plots keep what is around an instant, and go back to where a drive has told its code."""
         self._around, robot = None, self._playback.desk.stations[0].robot
         self.signals.refresh()
         self.signals.show_around(explaining_signals(robot.description, channel), at_ns)
         if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
-            a_row_ns = round(SECOND_NS / robot.rows_per_s) if robot.rows_per_s else 0
-            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + a_row_ns)
+            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + TOLD_NS)
             self._playback.step()
 
     def _refresh_beside(self) -> None:
