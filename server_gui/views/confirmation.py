@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
-from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.free_place import free_place
@@ -13,6 +13,7 @@ from server_gui.views.widgets.visibility import is_seen
 
 WIDTHS: Final = (420, 500, 580, 700)  # of its words; the first for which there is room
 Watched = Sequence[QWidget]  # what is looked at while a question is answered
+MOVES: Final = (QEvent.Type.Resize, QEvent.Type.Move)
 
 
 class Question(QDialog):
@@ -53,6 +54,9 @@ class Question(QDialog):
         column.addLayout(buttons)
         self._column = column
         (field or self.cancel).setFocus()
+        self._arranged = QTimer(self, singleShot=True)  # once the window has laid out what is in it
+        self._arranged.timeout.connect(self._leave_stops)
+        parent.window().installEventFilter(self)
 
     def add(self, field: QLineEdit) -> None:
         """Add another field, above the buttons."""
@@ -69,6 +73,17 @@ class Question(QDialog):
         place = free_place(sizes, room, kept)
         self._fit(WIDTHS[sizes.index(place.size())])
         self.move(place.topLeft())
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in MOVES:
+            self._arranged.start(0)
+        return False
+
+    def _leave_stops(self) -> None:
+        """Leave a STOP under which the window was moved or resized; where there is none, stay."""
+        window, taken = self.parentWidget().window(), self.frameGeometry()
+        if any(taken.intersects(stop) for stop in _seen(window.findChildren(StopButton))):
+            self.keep_in_sight(window, ())
 
     def _fit(self, wide: int) -> QSize:
         """Fit it around words of at least this width, and return its size."""

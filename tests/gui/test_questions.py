@@ -75,3 +75,22 @@ def test_stops_their_results_and_the_joints_stay_in_sight_beside_the_question_of
         is_long = ask is window.alarms.cleared and scale > 1.0  # there is no room beside all of it
         assert is_long or covered(question, [joints]) == []
         destroy(question)
+
+
+def test_a_question_leaves_a_stop_under_which_the_window_is_resized(
+    window: MainWindow, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.views.confirmation.in_sight", lambda _: window.geometry())
+    bench.station.take([walking(300), looked()])
+    window.resize(1366, 768)
+    window.header.reset.emit(bench.station)
+    (question,) = (one for one in window.findChildren(Question) if one.isVisible())
+    before = question.frameGeometry()
+    window.resize(1360, 760)
+    rules.settle()
+    assert question.frameGeometry() == before, "it covers nothing: it stays"
+    stop = next(one for one in window.findChildren(StopButton) if one.isVisible())
+    question.move(on_screen(stop).topLeft())
+    window.resize(1024, 700)
+    rules.settle()
+    assert covered(question, window.findChildren(StopButton)) == []
