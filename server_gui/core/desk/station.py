@@ -164,8 +164,13 @@ class Station:
     @property
     def alarms(self) -> Alarms:
         """What is wrong with it, as of now: a dozen views ask in each frame."""
+        self._look_for_alarms()
+        return self._alarms
+
+    def _look_for_alarms(self) -> None:
+        """Judge what there is to know, once in a moment."""
         if (moment := this_moment()) is not None and moment is self._judged:
-            return self._alarms
+            return
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         is_busy, entries = self.is_overloaded(), self.audit.entries
         facts = Facts(self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
@@ -178,7 +183,6 @@ class Station:
             lambda active: gathered(active, stalls, now_s, len(self.robot.parts)),
         )
         self._judged = moment  # by all of it: what raises half-way is looked for again
-        return self._alarms
 
     @property
     def mark(self) -> Mark:
@@ -240,7 +244,7 @@ class Station:
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
-            self.alarms  # noqa: B018 - seen now, so that it is known since when
+            self._look_for_alarms()  # now, so that it is known since when
             self.end_trial_if_over(now_ns)
 
     def _look_for_stalls(self, event: Telemetry) -> None:
