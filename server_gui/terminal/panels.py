@@ -20,7 +20,7 @@ from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import ENABLED, GLYPHS
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.alarms.texts import RESET_BUTTON
-from server_gui.core.alarms.unconfirmed import enabled_again, enabled_mark
+from server_gui.core.alarms.unconfirmed import enabled_mark, unstopped
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -336,7 +336,7 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     """Return the one thing that matters most now."""
     robot, writing = station.robot, station.writing
     active, newest = station.alarms.active, next(iter(station.news.items), None)
-    if enabled_again(robot, station.stopping):
+    if not station.stopping.is_unproven and unstopped(robot, station.stopping) is not None:
         return _alarm(active, controls)
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")

@@ -23,7 +23,12 @@ from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
 from server_gui.core.alarms.simulated import is_simulated, without_wires
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.alarms.unconfirmed import again_alarm, enabled_again, unconfirmed_alarm
+from server_gui.core.alarms.unconfirmed import (
+    again_alarm,
+    enabled_again,
+    let_go_alarm,
+    unconfirmed_alarm,
+)
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
@@ -107,6 +112,8 @@ def _found(facts: Facts) -> Iterator[Alarm]:
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
         yield unconfirmed_alarm(robot, stopping)
+    elif stopping.is_let_go:
+        yield let_go_alarm(robot, stopping)
     elif enabled_again(robot, stopping):
         yield again_alarm(robot, stopping)
     elif stopping.held and not (stopping.state is StopState.SENT and any_enabled(robot)):

@@ -15,7 +15,9 @@ class Kind(Enum):
 
     STILL_MOVING = "STILL MOVING"  # after a STOP that is not confirmed
     ENABLED_AGAIN = "ENABLED AGAIN"  # while a stop is held
+    NOT_HELD = "STOP NOT HELD"  # it was confirmed
     NOT_STOPPED = "STOP NOT CONFIRMED"
+    LEFT_UNSTOPPED = "removed, not stopped"  # from this window, before its STOP was confirmed
     ANOTHER = "ANOTHER ROBOT ANSWERS"
     NEVER_REACHED = "never reached"
     NO_LINK = "no link"
@@ -29,6 +31,7 @@ class Kind(Enum):
     BUS_FAILS = "bus fails"
     BUS_FULL = "bus full"
     NOT_RECORDED = "not recorded"
+    LEFT_RUNNING = "removed"  # from this window, and it may be enabled
     STOPPED = "STOPPED"
     PART_STALE = "component stale"
     STALLED = "computer paused"
@@ -43,7 +46,8 @@ class Kind(Enum):
     RESET = "stop reset"
 
 
-UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.ENABLED_AGAIN, Kind.NOT_STOPPED})
+LEFT: Final = frozenset({Kind.LEFT_UNSTOPPED, Kind.LEFT_RUNNING})
+UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.ENABLED_AGAIN, Kind.NOT_HELD, Kind.NOT_STOPPED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +65,16 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 _ENABLE: Final = "enable the drives (gwrms enable, or the robot's controller)"
 # Where only the controller may: the gateway is an observer.
 _START: Final = "enable the drives: start the robot's controller again"
+_ADD: Final = "add it again to see and stop it, or use the hardware stop"
 RESET_BUTTON: Final = "“Reset stop…”"  # of the window
 TEXTS: Final = dict(
     (
         _text(Kind.STILL_MOVING, "square", "bad", "STOP again, or use the hardware stop"),
         _text(Kind.ENABLED_AGAIN, "square", "bad", "STOP again, or use the hardware stop"),
+        _text(Kind.NOT_HELD, "square", "bad", "STOP again, or use the hardware stop"),
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
+        _text(Kind.LEFT_UNSTOPPED, "square", "bad", _ADD),
+        _text(Kind.LEFT_RUNNING, "triangle", "warn", _ADD),
         _text(
             Kind.ANOTHER,
             "square",

@@ -21,6 +21,7 @@ STOP_AGAIN: Final = "STOP again"
 KEEP_AT_HAND: Final = "keep the hardware stop at hand"
 USE_HARDWARE: Final = "use the hardware stop"
 NO_LINK: Final = "no link, nothing was sent"
+LET_GO: Final = "the robot says that it holds none, somebody may have reset it"
 
 
 def unconfirmed(robot: Robot) -> Kind:
@@ -41,7 +42,7 @@ def enabled_again(robot: Robot, stopping: StopProgress) -> list[str]:
 
 def enabled_mark(robot: Robot, stopping: StopProgress) -> Mark:
     """Return the mark of a drive that is enabled: no good state while a stop is sent or held."""
-    if stopping.is_unproven or enabled_again(robot, stopping):
+    if stopping.is_unproven or stopping.is_let_go or enabled_again(robot, stopping):
         return STILL_ENABLED
     return ASKED if stopping.held or stopping.state is StopState.SENT else STATES[ENABLED]
 
@@ -50,6 +51,8 @@ def unstopped(robot: Robot, stopping: StopProgress) -> Kind | None:
     """Return what a robot is in that was to stop and has not, or has not stayed so: the same everywhere."""
     if stopping.is_unproven:
         return unconfirmed(robot)
+    if stopping.is_let_go:
+        return Kind.NOT_HELD
     return Kind.ENABLED_AGAIN if enabled_again(robot, stopping) else None
 
 
@@ -60,6 +63,12 @@ def again_alarm(robot: Robot, stopping: StopProgress) -> Alarm:
     check, (how, by) = ", ".join(remedy(robot, stopping)), stopping.said
     aside = f"a stop is held: {'; '.join(filter(None, (how, by)))}"
     return Alarm(Kind.ENABLED_AGAIN, "", what, check=check, aside=aside)
+
+
+def let_go_alarm(robot: Robot, stopping: StopProgress) -> Alarm:
+    """Return the alarm of a stop that was confirmed, and that the robot does not hold."""
+    check, aside = ", ".join(remedy(robot, stopping)), f"it was {stopping.text.removeprefix('STOP ')}"
+    return Alarm(Kind.NOT_HELD, "", LET_GO, did=drives_did(robot), check=check, aside=aside)
 
 
 def unconfirmed_alarm(robot: Robot, stopping: StopProgress) -> Alarm:

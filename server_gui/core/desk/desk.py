@@ -5,12 +5,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Final
 
 from gateway.units import Units
 from gateway.wire.stop import Stopped
-from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.alarm import Alarm, Alarms
+from server_gui.core.alarms.texts import LEFT
 from server_gui.core.cloud.store_reach import StoreReach
+from server_gui.core.desk.left import left_alarm
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
@@ -21,8 +22,6 @@ from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.tuning.stop import Sent
 
 log = logging.getLogger(__name__)
-
-GONE: Final = "its STOP is gone"
 
 
 @dataclass(slots=True)
@@ -45,7 +44,8 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
-        self.left_running: dict[str, str] = {}  # by address, in words: were removed, and may be enabled
+        self.alarms = Alarms()  # of robots that were removed, and may be enabled
+        self._left: dict[str, Alarm] = {}  # the same by address
         self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
@@ -94,7 +94,7 @@ class Desk:
 
     def add(self, station: Station) -> None:
         """Add a robot; the first is selected, and one that was removed before is seen again."""
-        self.left_running.pop(station.address, None)
+        self._forget(station.address)
         self.stations.append(station)
         station.neighbours = self.stations
         if self.selected is None:
@@ -102,16 +102,31 @@ class Desk:
 
     def remove(self, station: Station) -> None:
         """Look at it no more; another one is selected where it was."""
+        left = None if station.robot.is_recording else left_alarm(station)
         if not station.robot.is_recording:
-            left_as = _left_as(station)
-            station.tell(NewsKind.CONTROL, f"removed {left_as}".rstrip())
-            if left_as:
-                self.left_running[station.address] = f"{station.title} was removed {left_as}"
+            station.tell(NewsKind.CONTROL, "removed" if left is None else f"removed {left.what}")
         if self._stop_all is not None:
             self._stop_all.remove(station)
         self.stations.remove(station)
+        if left is not None and station.address not in [one.address for one in self.stations]:
+            self._left[station.address] = left
+            self.alarms.look(self._left.values(), time.time())
         if self.selected is station:
             self.select(self.stations[0] if self.stations else None)
+
+    def acknowledge(self, station: Station | None, alarm: Alarm) -> None:
+        """Note that somebody has read an alarm: of a robot that was removed it is over with that."""
+        if station is not None:
+            station.acknowledge(alarm)
+        elif alarm.kind in LEFT:
+            self._forget(alarm.subject)
+        else:
+            self.recording.alarms.acknowledge(alarm.key)
+
+    def _forget(self, address: str) -> None:
+        """Warn no more of a robot that was removed."""
+        if self._left.pop(address, None) is not None:
+            self.alarms.look(self._left.values(), time.time())
 
     def select(self, station: Station | None) -> None:
         """Look at another robot. Staged edits belong to their robot and stay with it."""
@@ -167,10 +182,3 @@ def _note(station: Station, sent: Sent) -> None:
 
 def _words(error: Exception) -> str:
     return f"internal error: {type(error).__name__}: {error}"
-
-
-def _left_as(station: Station) -> str:
-    """Return how a robot is that nobody sees any more here, in words; "" where nothing of it is enabled."""
-    if not station.is_live:
-        return f"while it was not known whether its drives are enabled: {GONE}"
-    return f"while its drives were enabled: {GONE}" if any_enabled(station.robot) else ""

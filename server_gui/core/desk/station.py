@@ -18,7 +18,7 @@ from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
-from server_gui.core.alarms.alarm import Alarms
+from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
@@ -166,6 +166,12 @@ class Station:
         """What is wrong with it, as of now: a dozen views ask in each frame."""
         self._look_for_alarms()
         return self._alarms
+
+    def acknowledge(self, alarm: Alarm) -> None:
+        """Note that somebody has read it; how to go on after a reset is known then."""
+        self.alarms.acknowledge(alarm.key)
+        if alarm.kind is Kind.RESET:
+            self.stopping.was_ended = False
 
     def _look_for_alarms(self) -> None:
         """Judge what there is to know, once in a moment."""

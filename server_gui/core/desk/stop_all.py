@@ -122,8 +122,9 @@ def _held_by_another(one: Stopped) -> Standing:
 
 
 def _confirmed(one: Stopped) -> Standing:
-    if not one.stopping.held:
-        return _not_stopped(one, "STOP NOT HELD", "it was confirmed, and is held no more")
+    if one.stopping.is_let_go:
+        word = TEXTS[Kind.NOT_HELD].mark.word
+        return _not_stopped(one, word, "it was confirmed, and is held no more")
     if not is_live(one.robot):
         link = "no live values" if one.robot.is_linked else "no link"
         brief = f"{AS_FAR}: {link}"

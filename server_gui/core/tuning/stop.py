@@ -114,6 +114,11 @@ class StopProgress:
         return self.state, self.held
 
     @property
+    def is_let_go(self) -> bool:
+        """Whether it was confirmed, and by the robot's word none is held: its journal tells more."""
+        return self.state is StopState.CONFIRMED and not self.held
+
+    @property
     def is_unproven(self) -> bool:
         """Whether drives were told to stop and have not shown it: then "enabled" is no good state."""
         return self.state is StopState.NOT_CONFIRMED

@@ -22,6 +22,7 @@ from gateway.plain_text import plain
 from server_gui.core.alarms.alarm import Active, Alarms
 from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.core.alarms.severity import event_mark
+from server_gui.core.alarms.texts import LEFT
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import WHO
 from server_gui.core.desk.resetting import RESET_MARK
@@ -78,7 +79,11 @@ class NewsModel(QAbstractTableModel):
 
     def refresh(self) -> None:
         """Take what is new."""
-        alarms = (self._desk.recording.alarms, *(one.alarms for one in self._desk.stations))
+        alarms = (
+            self._desk.alarms,
+            self._desk.recording.alarms,
+            *(one.alarms for one in self._desk.stations),
+        )
         titles = {one.name: one.title for one in self._desk.stations}
         revision = (
             self._desk.news.revision,
@@ -271,6 +276,8 @@ def _of_alarm(station: Station | None, one: Active) -> EventRow:
     known = station is not None and alarm.channel is not None and one.at_ns is not None
     at = (station, str(alarm.channel), one.at_ns or 0) if station is not None and known else None
     who = WHO if station is None else station.title
+    if alarm.kind in LEFT:
+        who, text = where, alarm.what
     return EventRow(f"since {time_of_day(one.since_s)}", alarm.mark, who, text, at)
 
 

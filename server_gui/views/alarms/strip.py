@@ -9,7 +9,7 @@ from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import MORE
-from server_gui.core.alarms.texts import UNSTOPPED, Kind
+from server_gui.core.alarms.texts import UNSTOPPED
 from server_gui.core.commissioning.stages import StageView
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
@@ -37,7 +37,6 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
-LEFT_CHECK: Final = f"{REMEDY} add it again to see and stop it, or use the hardware stop"
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
 
@@ -82,7 +81,7 @@ class AlarmStrip(ClickableFrame):
         self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
         self.buttons.show_resources.clicked.connect(lambda: self.show_resources(self._first))
-        self.buttons.acknowledge.clicked.connect(self._acknowledge_shown)
+        self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
         again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
         self._words.resized.connect(self._say_again, again)
         theme.changed.connect(self._restyle)
@@ -109,8 +108,6 @@ class AlarmStrip(ClickableFrame):
             self._changed_s = time.monotonic()
         self._say(first)
         self.buttons.offer(first, all_of_them=self._is_wide)
-        if first is None and self._desk.left_running:
-            self.buttons.acknowledge.show()
         self.buttons.acknowledge.setEnabled(time.monotonic() - self._changed_s >= HOLD_S)
         self.more.setVisible(bool(self.told))
         set_button(self.more, "Details …" if len(self.told) == 1 else f"All {len(self.told)} …")
@@ -142,9 +139,7 @@ class AlarmStrip(ClickableFrame):
     def acknowledge(self, told: Told) -> None:
         """Acknowledge the alarm."""
         station, one = told
-        (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
-        if station is not None and one.alarm.kind is Kind.RESET:
-            station.stopping.was_ended = False
+        self._desk.acknowledge(station, one.alarm)
         self.refresh()
 
     # --- inside
@@ -154,21 +149,12 @@ class AlarmStrip(ClickableFrame):
         return self.told[0]
 
     def _beside(self) -> tuple[Mark, str, str]:
-        """Return what is no alarm of a robot here: of one that was removed or is commissioned, or none."""
-        if left := self._desk.left_running:
-            return Mark("triangle", "warn", "removed"), "; ".join(left.values()), LEFT_CHECK
+        """Return what is no alarm of a robot here: of one that is commissioned, or none."""
         commissioned = self.commissioned()
         if commissioned is not None and commissioned[1].mark.colour in ("warn", "bad"):
             name, look = commissioned
             return look.mark, f"{name} · {look.mark.word}", look.words
         return quiet(self._desk.selected, self._desk.recording)
-
-    def _acknowledge_shown(self) -> None:
-        if self.told:
-            self.acknowledge(self._first)
-            return
-        self._desk.left_running.clear()
-        self.refresh()
 
     def _turn(self) -> None:
         if self.told or self.list.isVisible():

@@ -14,7 +14,7 @@ from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import Mark, time_of_day
 
-Told = tuple[Station | None, Active]  # without a robot: of what this window records
+Told = tuple[Station | None, Active]  # without a robot: of what this window records, or one it had
 Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
 BREAK: Final = re.compile("[;,] ")  # between things to check
@@ -31,8 +31,8 @@ def key_of(told: Told) -> Key:
 
 
 def gathered(desk: Desk) -> list[Told]:
-    """Return every alarm: of the recording, then of each robot."""
-    found: list[Told] = [(None, one) for one in desk.recording.alarms.active]
+    """Return every alarm: of robots that were removed, of the recording, then of each robot."""
+    found: list[Told] = [(None, one) for of in (desk, desk.recording) for one in of.alarms.active]
     return found + [(station, one) for station in desk.stations for one in station.alarms.active]
 
 

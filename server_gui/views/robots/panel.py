@@ -21,6 +21,7 @@ from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import STOP_SENT
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.left import left_alarm
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
 from server_gui.core.tuning.stop import StopState
@@ -265,6 +266,8 @@ class RobotsPanel(QWidget):
         if station.is_live and any_enabled(station.robot):
             does = "walks" if station.processing.derived().gait.walking else "has enabled drives"
             goes = f"{station.title} {does}: its STOP leaves this window.\n\n"
+        elif (left := left_alarm(station)) is not None:
+            goes = f"{station.title} would be removed {left.what}.\n\n"
         text = (
             f"{goes}Remove {station.title} ({station.address}) from this window?\n\n"
             "Nothing of it is stopped: it goes on as it is, but no longer in sight, and STOP of this window "

@@ -1,0 +1,30 @@
+"""How a robot is left that is removed from the window: nobody sees or stops it there any more."""
+
+from typing import Final
+
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.drive_states import listed, state_words
+from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.texts import Kind, check_of
+from server_gui.core.alarms.unconfirmed import unstopped
+from server_gui.core.desk.station import Station
+from server_gui.core.tuning.stop import StopState
+
+GONE: Final = "its STOP is gone"
+
+
+def left_alarm(station: Station) -> Alarm | None:
+    """Return the alarm of one that is removed now; None where every drive is known to be off."""
+    robot, stopping = station.robot, station.stopping
+    kind, unknown = Kind.LEFT_RUNNING, [joint for joint, word in state_words(robot).items() if word is None]
+    if unstopped(robot, stopping) is not None or stopping.state is StopState.SENT:
+        kind, how = Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"
+    elif not station.is_live:
+        how = "while it was not known whether its drives are enabled"
+    elif any_enabled(robot):
+        how = "while its drives were enabled"
+    elif unknown:
+        how = f"while the state of {listed(unknown)} was not known"
+    else:
+        return None
+    return Alarm(kind, station.address, f"{how}: {GONE}", station.title, check=check_of(kind))

@@ -1,0 +1,127 @@
+"""A robot that is removed while it may be enabled, or has not stopped, is an alarm of the window."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import pytest
+
+from gateway.client import ConnectionState
+from gateway.wire.stop import Stopped
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import LinkChanged
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+
+ALL: Final = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
+HOUR_NS: Final = 3_600_000_000_000  # so that rows are new however slow a test is
+OFF, ENABLED = 6.0, 4.0
+
+
+@pytest.fixture
+def bench() -> Bench:
+    made = Bench(Desk())
+    made.add("exo-01").take([described("exo-01"), walking(10), looked()])
+    return made
+
+
+def seen(station: Station, states: Sequence[float | None]) -> None:
+    columns = {f"{joint}.state": [state] for joint, state in zip(JOINTS, states, strict=True)}
+    station.take([replace(telemetry([0], columns, time.monotonic_ns() + HOUR_NS), clock=None)])
+
+
+def off(bench: Bench) -> None:
+    seen(bench.station, [OFF] * 6)
+
+
+def enabled(bench: Bench) -> None:
+    seen(bench.station, [OFF] * 5 + [ENABLED])
+
+
+def unknown(bench: Bench) -> None:
+    seen(bench.station, [None] + [OFF] * 5)
+
+
+def gone(bench: Bench) -> None:
+    off(bench)
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+
+
+def asked(bench: Bench) -> None:
+    off(bench)
+    bench.station.stop("test")
+
+
+def failed(bench: Bench) -> None:
+    asked(bench)
+    bench.first.fail(RuntimeError("no answer"))
+
+
+def stopped(bench: Bench) -> None:
+    asked(bench)
+    bench.first.answer(ALL)
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "words"),
+    [
+        (off, None, ""),
+        (stopped, None, ""),
+        (enabled, Kind.LEFT_RUNNING, "while its drives were enabled"),
+        (unknown, Kind.LEFT_RUNNING, "while the state of left hip was not known"),
+        (gone, Kind.LEFT_RUNNING, "while it was not known whether its drives are enabled"),
+        (asked, Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"),
+        (failed, Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"),
+    ],
+)
+def test_what_is_not_known_to_be_off_is_named_and_how_it_was(
+    bench: Bench, how: Callable[[Bench], None], kind: Kind | None, words: str
+) -> None:
+    how(bench)
+    bench.desk.remove(bench.station)
+    told = [one.alarm for one in bench.desk.alarms.active]
+    assert [one.kind for one in told] == ([] if kind is None else [kind])
+    if kind is not None:
+        assert told[0].line == f"{kind.value}: exo-01: {words}: its STOP is gone"
+    assert bench.desk.news.items[0].text == (f"removed {words}: its STOP is gone" if words else "removed")
+
+
+def test_one_of_two_that_was_left_is_acknowledged_alone(bench: Bench) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02"), walking(10), looked()])
+    enabled(bench)
+    bench.desk.remove(bench.station)
+    bench.desk.remove(other)
+    first, second = (one.alarm for one in bench.desk.alarms.active)
+    bench.desk.acknowledge(None, first)
+    assert [one.alarm for one in bench.desk.alarms.active] == [second]
+
+
+def test_one_that_is_in_the_list_twice_is_not_gone(bench: Bench) -> None:
+    bench.add("again").take([described("exo-01"), walking(10), looked()])
+    enabled(bench)
+    bench.desk.remove(bench.station)
+    assert not bench.desk.alarms.active
+    enabled(bench)
+    bench.desk.remove(bench.station)
+    assert bench.desk.alarms.active
+
+
+def test_a_stop_that_was_confirmed_and_is_not_held_by_the_robots_word_is_an_alarm(bench: Bench) -> None:
+    """Header and drives were green and confirmed beside STOP ALL, which said that it is not held."""
+    station = bench.station
+    bench.desk.stop_all("test")
+    bench.first.answer(ALL)
+    gone(bench)
+    station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), described("exo-01")])
+    seen(station, [ENABLED] * 6)
+    assert station.alarms.active[0].alarm.kind is Kind.NOT_HELD
+    assert (station.mark.word, station.mark.colour) == ("STOP NOT HELD", "bad")
+    result = bench.desk.stopped_all
+    assert result is not None
+    assert "STOP NOT HELD" in result.wordings[0]
+    station.stop("again")
+    bench.commands[0].answer(ALL)
+    assert station.alarms.active[0].alarm.kind is not Kind.NOT_HELD
