@@ -24,7 +24,7 @@ def main(argv: list[str]) -> int:
         with connect(arguments, "stop") as robot:
             stopped = robot.stop(arguments.reason)
     except ClientError as error:
-        warn("stop", f"NOT CONFIRMED, take it that {spoken(arguments)} still moves. {error}")
+        warn("stop", f"NOT CONFIRMED, assume that {spoken(arguments)} still moves. {error}")
         return 1
     if arguments.json:
         say_json(stopped)
@@ -47,7 +47,8 @@ def _verdict(stopped: Stopped) -> int:
     if not stopped.drives:
         warn("stop", "NOT CONFIRMED: the robot has no drive that can be stopped")
     elif missing:
-        warn("stop", f"NOT CONFIRMED by {', '.join(missing)}: take it that they still move")
+        who = "it still moves" if len(missing) == 1 else "they still move"
+        warn("stop", f"NOT CONFIRMED by {', '.join(missing)}: assume that {who}")
     for said in filter(None, (stopped.outdated, stopped.problem)):
         warn("stop", said)
     return 0 if stopped.drives and not missing and stopped.outdated is None else 1

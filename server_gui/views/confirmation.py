@@ -6,7 +6,7 @@ from typing import Final
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
-from server_gui.views.widgets.free_place import free_place
+from server_gui.views.widgets.free_place import KEPT, free_place
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.visibility import is_seen
@@ -68,7 +68,8 @@ class Question(QDialog):
         frame = window.frameGeometry().size() - window.size()  # a question has much the same
         room = in_sight(window)
         stops = window.findChildren(StopButton)
-        kept = [list(_seen(widgets)) for widgets in (stops, *watched)]
+        results = [one for one in window.findChildren(QWidget) if one.property(KEPT)]
+        kept = [list(_seen(widgets)) for widgets in (stops, results, *watched)]
         sizes = [self._fit(wide) + frame for wide in WIDTHS]
         place = free_place(sizes, room, kept)
         self._fit(WIDTHS[sizes.index(place.size())])

@@ -225,7 +225,7 @@ def test_faults_are_chosen_by_name_and_device_and_shown_until_mended_and_refusal
     menu.actions()[0].trigger()
     demo.until(lambda: "Broken: node lost on left knee" in demo.bar.said.text(), "said what is broken")
     click(demo.bar.mend)
-    demo.until(lambda: "nothing is broken" in demo.bar.said.text(), "mended it")
+    demo.until(lambda: "nothing was broken" in demo.bar.said.text(), "mended it")
     demo.control.problem = "node_lost is already on left_knee; clear it first"
     demo.bar.faults.aboutToShow.emit()
     below(demo.bar.faults, "Node on the bus", "node lost").actions()[0].trigger()

@@ -438,10 +438,10 @@ def test_a_review_says_whose_parameters_it_writes_where_there_are_two_robots(
 ) -> None:
     panel.stage_text("gait.step_length", "430")
     panel.begin_review()
-    assert panel.review.title.text() == "Review: this and nothing else is written"
+    assert panel.review.title.text() == "Review: only this is written"
     add_named(bench, "exo-02")
     panel.begin_review()
-    assert panel.review.title.text() == "Review – exo-01: this and nothing else is written"
+    assert panel.review.title.text() == "Review – exo-01: only this is written"
     assert "to exo-01" in panel.review.write_it.toolTip()
 
 

@@ -174,7 +174,7 @@ def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
     assert session is not None
     assert moved is not None
     shown.draw()
-    assert player.beside_bar.cadence.text().startswith("gait cycles: ")
+    assert player.beside_bar.cadence.text().startswith("gait cycles of both legs: ")
     assert player.beside_bar.cadence.text().endswith(f": {moved.word}"), "and nothing is said of too few"
     first = next(one for one in archive.compared.pair or () if one.session != session.session)
     torque = Measured("left_knee.torque_rms", "torque RMS", "N·m", Word.CHANGED, 10, 12, 20.0, 30.0, 10.0)

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 WhenReady = Callable[[str], "Future[None]"]
 Kept = Future[str | None]  # why it is not held beyond this gateway
 OUTDATED = (
-    "{}; stopped were the drives of the robot's file as it was valid last: take it that any other still moves"
+    "{}; stopped were the drives of the robot's file as it was valid last: assume that any other still moves"
 )
 
 

@@ -46,7 +46,7 @@ class CycleRemarks:
             return (why, "gait cycles not known", "") if self._problem else ("gait cycles: reading …", "")
         one = next((one for one in self._metrics() if one.series == CADENCE), None)
         counts = self._turned(self._found.cycles_before, self._found.cycles_after)
-        cycles = f"gait cycles: {counts[0]} and {counts[1]}"
+        cycles = f"gait cycles of both legs: {counts[0]} and {counts[1]}"
         said = (
             () if one is None else (f"{cycles}, {text.removeprefix(BEGIN)}" for text in self._said(one)[:2])
         )

@@ -2,9 +2,9 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from typing import Final
+from typing import Any, Final
 
 from msgspec.structs import replace
 
@@ -27,8 +27,9 @@ from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
+from server_gui.core.audit.writes_of_others import WritesOfOthers
 from server_gui.core.desk.flag_watch import FlagWatch, of_stop
-from server_gui.core.desk.flags import Flag, FlagKind, Flags
+from server_gui.core.desk.flags import Flag, FlagKind, Flags, of_recorded_journal
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.edit_list import EditList
@@ -103,6 +104,7 @@ class Station:
         self.edits, self.writing = Edits(), WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
+        self._others = WritesOfOthers()
         self.flash = Flash(self.audit)
         self.objects = Objects(commands, deliver)
         self._commands = commands
@@ -233,6 +235,7 @@ class Station:
                     self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
+                    self._tell_of_others(event.journal.entries)
                     self.stopping.read(event.journal.entries, self.robot.boot_id)
                 case Described():
                     self._described(event.description, before)
@@ -252,6 +255,13 @@ class Station:
             self._watch.look(self.robot)
             self._look_for_alarms()  # now, so that it is known since when
             self.end_trial_if_over(now_ns)
+
+    def _tell_of_others(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        """Tell of what others have written: the values here are no longer what anybody here has set."""
+        described = () if self.robot.description is None else self.robot.description.parameters
+        for flag in of_recorded_journal(self._others.take(entries), described):
+            on_trial = ", on trial" if flag.kind is FlagKind.TRIAL else ""
+            self.tell(NewsKind.PARAMETER, f"{flag.text}{on_trial}")
 
     def _look_for_stalls(self, event: Telemetry) -> None:
         batch = event.batch
@@ -430,6 +440,7 @@ class Station:
 
     def _written(self, changes: tuple[ReviewedEdit, ...], written: Written) -> None:
         self.control.renewed(LEASE_S)
+        self._others.own(written.write)
         self.writing.done(written)
         self.robot.hold(written.after)
         self._back.forget()

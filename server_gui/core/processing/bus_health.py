@@ -19,6 +19,7 @@ TAKEN: Final = "of its time is taken"
 BUSY_PERCENT, NO_MORE_PERCENT = 80.0, 70.0  # as the gateway finds it: from, until
 OLD_S: Final = 5.0  # what was seen before is not known now
 UNKNOWN: Final = "bus not known"
+NO_ANSWER: Final = "no SDO"  # in the words for a node that does not answer
 FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
 GROWS: Final = re.compile(r", \d+ requests in a row")  # a count of one look, which the bus's page alone has
 NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
@@ -48,7 +49,7 @@ def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
 
 def level(bus: BusInfo) -> BusHealthLevel:
     """Return how bad a bus is."""
-    if bus.state in (CLOSED, OFF) or (bus.load_percent or 0.0) >= FULL_PERCENT:
+    if bus.state in (CLOSED, OFF) or _nobody_answers(bus) or (bus.load_percent or 0.0) >= FULL_PERCENT:
         return BusHealthLevel.ALARM
     if bus.state != ACTIVE or (bus.load_percent or 0.0) >= BUSY_PERCENT or bus.findings or bus.problem:
         return BusHealthLevel.WARNING
@@ -132,12 +133,13 @@ def rated(bus: BusInfo) -> list[Rated]:
     of_state, of_load = (
         alarm if bad else warning for bad in (bus.state in (CLOSED, OFF), load >= FULL_PERCENT)
     )
+    gathered = _gathered(bus.nodes)
     told = [
         (of_state, bus.problem or "", ""),
         (of_state, bus.state if bus.state != ACTIVE else "", ""),
         *((of_load, *one) for one in full),
         *((warning, one.words, one.check) for one in own),
-        *((warning, *one) for one in _gathered(bus.nodes)),
+        *((alarm if _nobody_answers(bus) and NO_ANSWER in one[0] else warning, *one) for one in gathered),
     ]
     return [one for one in told if one[1]]
 
@@ -149,7 +151,7 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
         return None
     load = bus.load_percent or 0.0
     short = {
-        "no answer": any("no SDO" in one.words for node in bus.nodes for one in node.findings),
+        "no answer": any(map(_is_silent, bus.nodes)),
         "PDOs missing": any(_misses(node) for node in bus.nodes),
         "findings": bool(bus.findings),
         "not read in time": any("stood still" in one.words for one in bus.findings),
@@ -167,6 +169,15 @@ def _joined(texts: Iterable[str]) -> str:
     return "; ".join(dict.fromkeys(filter(None, texts)))
 
 
+def _is_silent(node: NodeInfo) -> bool:
+    return any(NO_ANSWER in one.words for one in node.findings)
+
+
+def _nobody_answers(bus: BusInfo) -> bool:
+    """Return whether all of several nodes are silent: then it is the bus, and no drive is known."""
+    return len(bus.nodes) > 1 and all(map(_is_silent, bus.nodes))
+
+
 def _misses(node: NodeInfo) -> bool:
     return told_percent(node) > 0.0
 
@@ -181,8 +192,13 @@ def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
         for words, check in said:
             same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
     for (_, check), found in same.items():
-        said_of = [words if len(found) == 1 else words.replace(" its ", " their ") for _, words in found]
+        said_of = [words if len(found) == 1 else _of_several(words) for _, words in found]
         yield f"{_whose([node for node, _ in found], nodes)}: {_spread(said_of)}", check
+
+
+def _of_several(words: str) -> str:
+    """Return what is said of one node for several."""
+    return re.sub(r"^it answers\b", "they answer", words.replace(" its ", " their "))
 
 
 def _whose(found: Sequence[NodeInfo], nodes: Sequence[NodeInfo]) -> str:

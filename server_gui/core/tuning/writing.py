@@ -116,7 +116,7 @@ class WriteProgress:
     def reverting(self) -> None:
         """Note a revert that the robot reports, before it is read back."""
         self.trial = None
-        self._set(WriteState.WRITING, "taken back: reading what is held …")
+        self._set(WriteState.WRITING, "taken back: the values shown are read again …")
 
     def reverted(self, how: str) -> None:
         """Note that the trial was reverted."""

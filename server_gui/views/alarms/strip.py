@@ -204,6 +204,7 @@ class AlarmStrip(ClickableFrame):
             (main, rest) for main in wordings for rest in fuller if sizes[main] + rests[rest] <= room.height()
         ]
         main, rest = min(fits, key=_lacks, default=(wordings[-1], ""))
+        self._words.have_bar(wanted=not fits)
         set_text(self.headline, main)
         set_text(self.details, rest)
         self.details.setVisible(bool(rest))
@@ -259,6 +260,11 @@ class _Words(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setMinimumSize(1, 1)
+
+    def have_bar(self, *, wanted: bool) -> None:
+        """Have a scroll bar only for what does not fit without one: it takes room, and would need itself."""
+        policy = Qt.ScrollBarPolicy
+        self.setVerticalScrollBarPolicy(policy.ScrollBarAsNeeded if wanted else policy.ScrollBarAlwaysOff)
 
     def sizeHint(self) -> QSize:
         return QSize(1, 1)

@@ -64,7 +64,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
         return Mark("diamond", "accent"), "No alarm then", UNSEEN
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
-    if station.mark.colour in ("warn", "bad", "old"):  # as its card says
+    if station.mark.colour != "good":  # as its card says
         return station.mark, "No alarms", station.mark.word
     known = station.predictions
     if known.foresees and not (known.danger is not None and known.danger.is_known):

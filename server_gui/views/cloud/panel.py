@@ -41,6 +41,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: what is narrower has no room for two cards beside each other
 UPLOAD_NOW: Final = "Upload now"
+HOLDS_HINT: Final = "Everything that lies in the store: the tables with their logs, and the models"
 UPLOAD_HINT: Final = "Everything recorded so far, without waiting for a full batch"
 TRY: Final = "Try again now"
 TRY_HINT: Final = "Look for the store at once, and upload what waits if it is there"
@@ -77,6 +78,7 @@ class Cloud(QWidget):
         self.jobs = JobsTable(archive.jobs, theme)
         self._cards = {name: Card(name) for name in ("Store", "Waiting for upload", "In the store", "Jobs")}
         self._facts = {name: _value() for name in ("URL", "Service", "Keys", "Holds")}
+        set_tip(self._facts["Holds"], HOLDS_HINT)
         self._icon, self.state = MarkIcon(theme), PlainLabel()
         self.state.setWordWrap(True)
         self.settings = SettingsForm(archive.settings, archive.file or default_file())
@@ -211,7 +213,7 @@ class Cloud(QWidget):
         if library.looked_s is None or library.found.problem is not None or library.reach.problem is not None:
             return "not known"
         stored = sum(session.uploaded for session in library.found.sessions)
-        return f"{size(library.found.size_bytes)}; recordings: {stored}"
+        return f"{size(library.found.size_bytes)} in all; recordings: {stored}"
 
     def _refresh_waiting(self) -> None:
         report = self._recording.report

@@ -151,7 +151,7 @@ class DemoBar(QToolBar):
             return f"Not done: {self._failed}"
         broken = ", ".join(f"{words(one.name)} on {words(one.on)}" for one in self._listed.active)
         tripped = ", ".join(map(words, self._tripped()))
-        said = f"Broken: {broken}" if broken else "Simulated robot; nothing is broken"
+        said = f"Broken: {broken}" if broken else "Simulated robot; nothing was broken here"
         if tripped:
             clear = f"Clear fault{ENDS if held else ''}"
             how = f"{REPAIR}, then {clear}" if broken else clear

@@ -248,7 +248,7 @@ def _drives(station: Station) -> Words:
     if not station.is_live and is_last_held(station):
         return Words(Mark("ring", "warn"), "Off when last seen", (no_data(station), count))
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (count,))
     mark = drives_mark(station.robot, enabled_mark(station.robot, station.stopping))
     few = SHORTER.get(mark.word, mark.word).capitalize()
     brief = (few, count.removesuffix(" enabled"))

@@ -57,7 +57,7 @@ from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stop_button import StopButton
-from server_gui.views.widgets.visibility import has_focus_in, is_seen
+from server_gui.views.widgets.visibility import has_focus_in, is_all_seen, is_seen
 
 EVENTS: Final = 2  # among the docks
 EVENTS_LIVE: Final = "Events, live"  # beside a recording that is played
@@ -223,8 +223,8 @@ class MainWindow(QMainWindow):
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
 
     def _offer_stop_all(self) -> None:
-        """Have it in sight beside the pages where the panel with the robots is not."""
-        is_needed = len(self._desk.stations) > 1 and not is_seen(self.robots.all_stop)
+        """Have it in sight beside the pages where the one below the robots is not, or is cut."""
+        is_needed = len(self._desk.stations) > 1 and not is_all_seen(self.robots.all_stop)
         self.stop_everyone.allow(self._theme.px(ALL_WIDE))
         if self.stop_everyone.isHidden() is is_needed:
             self.stop_everyone.setVisible(is_needed)

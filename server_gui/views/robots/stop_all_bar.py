@@ -10,6 +10,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import style
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
+from server_gui.views.widgets.free_place import KEPT
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.wrapping_label import WrappingLabel
@@ -28,6 +29,7 @@ class StopAllBar(QFrame):
         self._theme = theme
         self._wordings: tuple[str, ...] = ("",)
         self.setObjectName("alarm")
+        self.setProperty(KEPT, True)
         self.setAccessibleName("What became of STOP ALL")
         self._icon, self.words = MarkIcon(theme, 13), WrappingLabel()
         row = QHBoxLayout(self)

@@ -1,10 +1,12 @@
 """The place for something that lies over a window: beside what must stay in sight."""
 
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 from PySide6.QtCore import QPoint, QRect, QSize
 
 Rects = Sequence[QRect]
+KEPT: Final = "kept in sight"  # a property of what no question lies over where there is room elsewhere
 
 
 def free_place(sizes: Sequence[QSize], room: QRect, kept: Sequence[Rects]) -> QRect:

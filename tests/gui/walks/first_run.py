@@ -41,7 +41,7 @@ def break_something(bench: Bench) -> None:
     hand.sees("0x2310")
     hand.keep("broken")
     clear_fault(hand, "fault: left knee")
-    hand.sees("nothing is broken")
+    hand.sees("nothing was broken")
     hand.click("Start walking")
     until(lambda: any(map(hand.reads, ENABLED)), "walked again", AGAIN_S)
     hand.click("stop", exactly=True)

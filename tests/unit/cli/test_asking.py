@@ -356,7 +356,7 @@ def test_stop_that_the_robot_refuses_is_loud(robot: FakeRobot, capsys: pytest.Ca
 
     robot.overrides["robot.stop"] = refuse
     assert run(robot, "stop") == 1
-    assert "NOT CONFIRMED, take it that the robot still moves. the bus is not open" in capsys.readouterr().err
+    assert "NOT CONFIRMED, assume that the robot still moves. the bus is not open" in capsys.readouterr().err
 
 
 # --- units and times as people think of them

@@ -15,7 +15,7 @@ NOBODY = ("--robot", "127.0.0.1:9")
 @pytest.mark.parametrize(
     ("argv", "kind", "words"),
     [
-        (("stop", *NOBODY), "Failed", "NOT CONFIRMED, take it that the robot still moves. no gateway at"),
+        (("stop", *NOBODY), "Failed", "NOT CONFIRMED, assume that the robot still moves. no gateway at"),
         (("describe", *NOBODY), "Unreachable", "no gateway at 127.0.0.1:9"),
         (("gatway",), "Usage", "there is no command 'gatway'; did you mean gateway?"),
         (("describe", "--rbot", "exo"), "Usage", "unrecognized arguments: --rbot exo"),

@@ -35,7 +35,7 @@ def test_a_stop_of_a_robot_by_its_name_says_and_advises_that_name(
     assert "it is reset (gwrms reset --robot exo-01)" in capsys.readouterr().out
     assert main(["stop", "--robot", "exo-02"]) == 1
     said = capsys.readouterr().err
-    assert "take it that exo-02 still moves. exo-02 (192.0.2.7:7420) is not paired" in said
+    assert "assume that exo-02 still moves. exo-02 (192.0.2.7:7420) is not paired" in said
     assert "use the address" not in said, "it was asked for by the name in that very file"
 
 

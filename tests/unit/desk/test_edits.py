@@ -174,7 +174,7 @@ def test_a_trial_is_kept_or_taken_back_by_its_number(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("holds", "after_s", "said"),
     [
-        (0.43, 0.1, "taken back: reading what is held …"),  # asked for before the answer
+        (0.43, 0.1, "taken back: the values shown are read again …"),  # asked for before the answer
         (0.4, 0.1, "taken back: step length (gait) is 400 mm again"),
         (0.43, 5.0, "taken back, but other values are held: look at them"),
     ],
@@ -185,7 +185,7 @@ def test_what_was_taken_back_is_said_to_be_when_it_is_shown_so(
     on_trial(bench)
     bench.station.end_trial()
     bench.first.answer(Reverted(7, {STEP: "taken back"}))
-    assert bench.station.writing.text == "taken back: reading what is held …"
+    assert bench.station.writing.text == "taken back: the values shown are read again …"
     read_ns = time.monotonic_ns() + round(after_s * 1e9)
     bench.station.take([looked({**HELD, STEP: holds}, at_ns=read_ns)])
     assert bench.station.writing.text == said

@@ -161,9 +161,19 @@ def test_what_several_nodes_have_is_said_once() -> None:
         assert findings(replace(bus, nodes=[*nodes, *wells])) == [(said, "")]
     lost = [replace(node, findings=[LOST]) for node in nodes[:2]]
     assert findings(replace(bus, nodes=[*lost, nodes[2]])) == [
-        (f"left hip, left knee: {LOST.words}", LOST.check),
+        ("left hip, left knee: they answer no SDO", LOST.check),
         ("right knee: 5 % of its PDOs are missing", ""),
     ]
+
+
+def test_where_no_node_answers_any_more_the_bus_fails() -> None:
+    """It was a warning like that of one node, beside drives of which none was known."""
+    nodes = [replace(NODE, node_id=place, findings=[LOST]) for place in (1, 2, 3)]
+    bus = replace(BUS, nodes=nodes)
+    assert level(bus) is BusHealthLevel.ALARM
+    assert rated(bus) == [(BusHealthLevel.ALARM, "all 3 nodes: they answer no SDO", LOST.check)]
+    well = replace(bus, nodes=[*nodes[:2], NODE])
+    assert level(well) is BusHealthLevel.WARNING
 
 
 def test_a_count_that_grows_is_told_by_the_page_alone_and_each_finding_has_its_own_level() -> None:
