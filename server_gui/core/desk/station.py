@@ -2,9 +2,9 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
-from typing import Any, Final
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -27,11 +27,11 @@ from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
-from server_gui.core.audit.writes_of_others import WritesOfOthers
 from server_gui.core.desk.flag_watch import FlagWatch, of_stop
-from server_gui.core.desk.flags import Flag, FlagKind, Flags, of_recorded_journal
+from server_gui.core.desk.flags import Flag, FlagKind, Flags
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
+from server_gui.core.desk.writes_of_others import WritesOfOthers
 from server_gui.core.evidence.edit_list import EditList
 from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.experiments.plan import ExperimentPlan
@@ -61,10 +61,10 @@ from server_gui.core.tuning.edits import Edits, ReviewedEdit
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.reverted_trials import OVERDUE_S, RevertedTrials
+from server_gui.core.tuning.reverted_trials import RevertedTrials
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
-from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
+from server_gui.core.tuning.writing import WriteProgress, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
 
@@ -104,7 +104,6 @@ class Station:
         self.edits, self.writing = Edits(), WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
-        self._others = WritesOfOthers()
         self.flash = Flash(self.audit)
         self.objects = Objects(commands, deliver)
         self._commands = commands
@@ -117,6 +116,7 @@ class Station:
         self._happened = FlagWatch()
         self._stalls = Stalls()
         self._back = RevertedTrials(self.robot, self.writing, self.tell)
+        self._others = WritesOfOthers(self.robot, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
 
     @property
@@ -235,7 +235,7 @@ class Station:
                     self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
-                    self._tell_of_others(event.journal.entries)
+                    self._others.take(event.journal.entries)
                     self.stopping.read(event.journal.entries, self.robot.boot_id)
                 case Described():
                     self._described(event.description, before)
@@ -254,14 +254,7 @@ class Station:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self._look_for_alarms()  # now, so that it is known since when
-            self.end_trial_if_over(now_ns)
-
-    def _tell_of_others(self, entries: Sequence[Mapping[str, Any]]) -> None:
-        """Tell of what others have written: the values here are no longer what anybody here has set."""
-        described = () if self.robot.description is None else self.robot.description.parameters
-        for flag in of_recorded_journal(self._others.take(entries), described):
-            on_trial = ", on trial" if flag.kind is FlagKind.TRIAL else ""
-            self.tell(NewsKind.PARAMETER, f"{flag.text}{on_trial}")
+            self._back.look_if_over(now_ns)
 
     def _look_for_stalls(self, event: Telemetry) -> None:
         batch = event.batch
@@ -475,28 +468,6 @@ class Station:
     def _kept(self) -> None:
         self.writing.kept()
         self.tell(NewsKind.PARAMETER, self.writing.text)
-
-    def _taken_back(self, how: str) -> None:
-        self.writing.reverted(how)
-        self.tell(NewsKind.PARAMETER, how)
-
-    def end_trial_if_over(self, now_ns: int) -> None:
-        """Check whether an expired trial is reverted: the robot must hold the old values again.
-
-        Only values that were read after its end count: a link, or this window, may be slow.
-        """
-        trial, read_ns = self.writing.trial, self.robot.parameters_at_ns
-        if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
-            return
-        if self.robot.holds(trial.before):
-            again = self.writing.held_again(trial.before)
-            self._taken_back(f"the trial's time is over, the robot has taken it back: {again}; see Edits")
-        else:
-            self.writing.trial = None
-            self.writing.say(
-                WriteState.UNKNOWN, "the trial's time is over, but other values are held: look at them"
-            )
-            self.tell(NewsKind.WARNING, self.writing.text)
 
     def store(self, *components: str) -> None:
         """Make devices keep their parameters over a reset, one after another."""

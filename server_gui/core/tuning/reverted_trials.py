@@ -10,6 +10,7 @@ from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 OVERDUE_S: Final = 2.0  # after its end values are looked at again
+OVER: Final = "the trial's time is over"
 OTHERS: Final = "taken back, but other values are held: look at them"
 
 
@@ -46,3 +47,20 @@ class RevertedTrials:
             self._awaited = None
             self._writing.say(WriteState.UNKNOWN, OTHERS)
             self._tell(NewsKind.WARNING, OTHERS)
+
+    def look_if_over(self, now_ns: int) -> None:
+        """Check whether an expired trial is reverted: the robot must hold the old values again.
+
+        Only values that were read after its end count: a link, or this window, may be slow.
+        """
+        trial, read_ns = self._writing.trial, self._robot.parameters_at_ns
+        if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
+            return
+        if self._robot.holds(trial.before):
+            back = f"{OVER}, the robot has taken it back: {self._writing.held_again(trial.before)}; see Edits"
+            self._writing.reverted(back)
+            self._tell(NewsKind.PARAMETER, back)
+        else:
+            self._writing.trial = None
+            self._writing.say(WriteState.UNKNOWN, f"{OVER}, but other values are held: look at them")
+            self._tell(NewsKind.WARNING, self._writing.text)
