@@ -55,7 +55,7 @@ class Question(QDialog):
         self._column = column
         (field or self.cancel).setFocus()
         self._arranged = QTimer(self, singleShot=True)  # once the window has laid out what is in it
-        self._arranged.timeout.connect(self._leave_stops)
+        self._arranged.timeout.connect(lambda: self._leave_stops(parent.window()))
         parent.window().installEventFilter(self)
 
     def add(self, field: QLineEdit) -> None:
@@ -67,8 +67,8 @@ class Question(QDialog):
         """Lie over no STOP of the window, and over what is watched as little as can be, the first least."""
         frame = window.frameGeometry().size() - window.size()  # a question has much the same
         room = in_sight(window)
-        stops = window.findChildren(StopButton)
-        results = [one for one in window.findChildren(QWidget) if one.property(KEPT)]
+        stops: Watched = window.findChildren(StopButton)
+        results: Watched = [one for one in window.findChildren(QWidget) if one.property(KEPT)]
         kept = [list(_seen(widgets)) for widgets in (stops, results, *watched)]
         sizes = [self._fit(wide) + frame for wide in WIDTHS]
         place = free_place(sizes, room, kept)
@@ -80,9 +80,9 @@ class Question(QDialog):
             self._arranged.start(0)
         return False
 
-    def _leave_stops(self) -> None:
+    def _leave_stops(self, window: QWidget) -> None:
         """Leave a STOP under which the window was moved or resized; where there is none, stay."""
-        window, taken = self.parentWidget().window(), self.frameGeometry()
+        taken = self.frameGeometry()
         if any(taken.intersects(stop) for stop in _seen(window.findChildren(StopButton))):
             self.keep_in_sight(window, ())
 
