@@ -220,6 +220,7 @@ def test_a_replay_stands_at_the_fault_whose_signals_are_shown_and_says_its_alarm
     assert jumped_ns is not None
     assert frozen.newest_ns - jumped_ns == pytest.approx(5e9, abs=2e8), "what comes after it is kept"
     assert signals._read_s == (jumped_ns - frozen.newest_ns) / 1e9, "values are those at it"
+    assert signals.plots[0].note == f"0:0{FAULT_S:.2f}", "as the axis below it counts"
     assert any(flag.kind is FlagKind.FAULT for flag in signals._jumped_flags)
 
 

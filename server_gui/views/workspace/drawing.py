@@ -12,7 +12,7 @@ from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.series import Floats
 from server_gui.core.workspace.trigger import WINDOWS, On, TriggerState
 from server_gui.views.widgets.plot import PlacedFlag
-from server_gui.views.widgets.time_axis import NOW, PAUSED, SHOWN, time_text
+from server_gui.views.widgets.time_axis import NOW, PAUSED, SHOWN, session_text, time_text
 from server_gui.views.workspace.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
 
@@ -61,7 +61,7 @@ def _comes_late(scene: Scene, card: UnitPlot) -> bool:
 def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float | None) -> None:
     """Say the values at a time (s until the newest row), None: the newest."""
     live = scene.frozen is not None or not station.robot.is_stale()
-    when = "" if at_s is None else time_text(round(at_s, 2))
+    when = "" if at_s is None else _when(at_s, _session_s(scene, station))
     for card in cards:
         if isinstance(card, EmptyPlot):
             continue
@@ -72,6 +72,11 @@ def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float |
         theirs = [] if scene.beside is None else [scene.read(text, at_s, beside=True) for text in card.drawn]
         alone = card.drawn[0] if len(card.drawn) == 1 and at_s is None else ""
         card.show_values(values, theirs, live=live, notes=scene.remarks.get(alone) or (when,))
+
+
+def _when(at_s: float, session_s: float | None) -> str:
+    """Return a time (s until the newest row) as the axis of time says it, to 10 ms."""
+    return time_text(round(at_s, 2)) if session_s is None else session_text(session_s + at_s, 0.01)
 
 
 def columns(scene: Scene, text: str, times: Floats) -> Iterator[tuple[str, Floats]]:
