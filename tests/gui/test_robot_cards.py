@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from PySide6.QtCore import Qt
 
 from gateway.client import ConnectionState, NotConnected
 from gateway.wire.stop import Stopped
@@ -10,6 +11,7 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.visibility import is_all_seen
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import fault, settle
@@ -155,8 +157,23 @@ def test_stop_all_is_in_sight_beside_the_pages_where_the_list_of_robots_is_not(
     theme.set(scale=1.0)
     settle(window, bench)
     window.docks[0].show()
-    settle(window, bench)
+    for _ in range(2):  # the panel has its width in the frame after that in which it is shown
+        settle(window, bench)
     assert not window.stop_everyone.isVisible()
+
+
+def test_stop_all_is_whole_beside_the_pages_where_the_list_of_robots_is_narrow(
+    window: MainWindow, bench: Bench
+) -> None:
+    window.resize(1366, 768)
+    for place in range(2, 5):
+        bench.add(f"exo-0{place}", 7420 + place).take([described(f"exo-0{place}"), walking(20), looked()])
+    for wide, is_cut in ((60, True), (250, False)):
+        window.resizeDocks(window.docks[:1], [wide], Qt.Orientation.Horizontal)
+        for _ in range(3):
+            settle(window, bench)
+        assert is_all_seen(window.robots.all_stop) is not is_cut
+        assert window.stop_everyone.isVisible() is is_cut
 
 
 def test_a_robot_that_is_enabled_is_not_removed_without_saying_so(around: Around, bench: Bench) -> None:

@@ -98,7 +98,7 @@ def enabled_text(robot: Robot, *, live: bool) -> str:
     known = [word for joint in joints if live and (word := robot.word(f"{joint}.state")) is not None]
     enabled = known.count(ENABLED) if known or (live and not joints) else "–"
     unknown = f", {len(joints) - len(known)} not known" if known and len(known) < len(joints) else ""
-    every = "–" if robot.description is None else len(joints)  # nobody knows how many it has
+    every = len(joints) if joints or live else "–"  # nobody knows how many it has
     return f"{enabled} of {every} enabled{unknown}"
 
 

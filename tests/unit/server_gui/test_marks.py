@@ -32,7 +32,7 @@ OFF = "switch on disabled"
         ([None, None], True, "– of 2 enabled"),
         ([ENABLED, ENABLED], False, "– of 2 enabled"),
         ([], True, "0 of 0 enabled"),
-        ([], False, "– of 0 enabled"),
+        ([], False, "– of – enabled"),
     ],
 )
 def test_a_drive_whose_state_is_not_known_is_not_counted_as_off(
