@@ -51,6 +51,10 @@ def test_no_alarm_on_a_full_computer_is_not_called_all_ok(
     monkeypatch.setattr(type(bench.station.robot), "has_rate", lambda *_: True)
     monkeypatch.setattr(type(bench.station.robot), "is_slow", lambda *_: False)
     assert quiet(bench.station)[2] == "all ok"
+    bench.station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=11.1))
+    assert quiet(bench.station)[0].colour == "warn", "somebody who falls is like nothing that it knows"
+    assert "look at the wearer" in quiet(bench.station)[2]
+    bench.station.predictions.clear()
     bench.station.is_full = lambda: True
     mark, headline, why = quiet(bench.station)
     assert (mark.colour, headline) == ("warn", "This computer is busy")

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterable
 from typing import Final
 
+from ml.robot.task import ABNORMAL
 from server_gui.core.alarms.alarm import ASIDE, MORE, Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.overload import ALSO
@@ -19,6 +20,7 @@ Key = tuple[str, tuple[Kind, str]]
 BUSY: Final = "no alarms, but what is shown may be late: end other programs on this computer"
 BREAK: Final = re.compile("[;,] ")  # between things to check
 SINCE: Final = "since "
+UNLIKE: Final = "abnormal: unlike all that the model has learned from; look at the wearer"
 UNSEEN: Final = "of its signals; trouble of its buses is on the time axis"
 BLAME: Final = re.compile(r"gwrms blame(?:, gwrms snapshot resource)?")
 BLAME_PAGE: Final = "on the page Resources"
@@ -69,6 +71,8 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     known = station.predictions
     if known.foresees and not (known.danger is not None and known.danger.is_known):
         return Mark("ring", "dim"), "No alarms", "danger is not known"
+    if any(not told.is_stale() and told.prediction.label == ABNORMAL for told in known.told.values()):
+        return Mark("triangle", "warn", ABNORMAL), "No alarms", UNLIKE
     if recording is not None and recording.can_ask and not recording.reach.is_known:
         return Mark("ring", "dim"), "No alarms", "the store is not known"
     if not station.robot.has_rate():
