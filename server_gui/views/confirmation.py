@@ -13,7 +13,7 @@ from server_gui.views.widgets.visibility import is_seen
 
 WIDTHS: Final = (420, 500, 580, 700)  # of its words; the first for which there is room
 Watched = Sequence[QWidget]  # what is looked at while a question is answered
-MOVES: Final = (QEvent.Type.Resize, QEvent.Type.Move)
+MOVES: Final = (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show)
 
 
 class Question(QDialog):
@@ -56,7 +56,8 @@ class Question(QDialog):
         (field or self.cancel).setFocus()
         self._arranged = QTimer(self, singleShot=True)  # once the window has laid out what is in it
         self._arranged.timeout.connect(lambda: self._leave_stops(parent.window()))
-        parent.window().installEventFilter(self)
+        for one in (parent.window(), *_results(parent.window())):
+            one.installEventFilter(self)
 
     def add(self, field: QLineEdit) -> None:
         """Add another field, above the buttons."""
@@ -68,8 +69,7 @@ class Question(QDialog):
         frame = window.frameGeometry().size() - window.size()  # a question has much the same
         room = in_sight(window)
         stops: Watched = window.findChildren(StopButton)
-        results: Watched = [one for one in window.findChildren(QWidget) if one.property(KEPT)]
-        kept = [list(_seen(widgets)) for widgets in (stops, results, *watched)]
+        kept = [list(_seen(widgets)) for widgets in (stops, _results(window), *watched)]
         sizes = [self._fit(wide) + frame for wide in WIDTHS]
         place = free_place(sizes, room, kept)
         self._fit(WIDTHS[sizes.index(place.size())])
@@ -81,9 +81,9 @@ class Question(QDialog):
         return False
 
     def _leave_stops(self, window: QWidget) -> None:
-        """Leave a STOP under which the window was moved or resized; where there is none, stay."""
+        """Leave a STOP, or the result of one, that has come to lie under it; where there is none, stay."""
         taken = self.frameGeometry()
-        if any(taken.intersects(stop) for stop in _seen(window.findChildren(StopButton))):
+        if any(taken.intersects(one) for one in _seen([*window.findChildren(StopButton), *_results(window)])):
             self.keep_in_sight(window, ())
 
     def _fit(self, wide: int) -> QSize:
@@ -119,6 +119,11 @@ def ask(
 def in_sight(window: QWidget) -> QRect:
     """Return what of a window is on its screen."""
     return window.frameGeometry() & window.screen().availableGeometry()
+
+
+def _results(window: QWidget) -> Watched:
+    """Return what says what became of a STOP, also where it is hidden yet."""
+    return [one for one in window.findChildren(QWidget) if one.property(KEPT)]
 
 
 def _seen(widgets: Iterable[QWidget]) -> Iterable[QRect]:

@@ -84,3 +84,22 @@ def test_a_line_that_fits_without_a_scroll_bar_leaves_what_to_check_its_room(
     assert strip.headline.text() == told.line
     assert strip.details.text().startswith("since ")
     assert strip.details.text().endswith(told.check)
+
+
+def test_a_scroll_bar_goes_with_the_words_that_needed_it(around: Around, bench: Bench, theme: Theme) -> None:
+    """It takes the room by which what fits without it needs it: the second line was cut, and stayed so."""
+    around.resize(1500, 900)
+    fault(bench)
+    settle(around, bench)
+    strip, metrics = around.alarms, around.alarms.headline.fontMetrics()
+    bar = strip._words.verticalScrollBar()
+    whole, said = strip._words.room.width(), ""
+    while metrics.horizontalAdvance(f"{said}m ") < whole:
+        said += "m "
+    strip._fit((said * 4,), ("",))
+    rules.settle()
+    assert bar.isVisible(), "nothing shorter is to be had"
+    strip._fit((said.rstrip(),), ("since 10:00:00",))
+    rules.settle()
+    assert (strip.headline.text(), strip.details.text()) == (said.rstrip(), "since 10:00:00")
+    assert not bar.isVisible()

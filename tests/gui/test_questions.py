@@ -77,6 +77,37 @@ def test_stops_their_results_and_the_joints_stay_in_sight_beside_the_question_of
         destroy(question)
 
 
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_question_leaves_the_result_of_stop_all_in_sight_whichever_comes_first(
+    window: MainWindow, bench: Bench, monkeypatch: pytest.MonkeyPatch, is_open: bool
+) -> None:
+    monkeypatch.setattr("server_gui.views.confirmation.in_sight", lambda _: window.geometry())
+    window.resize(1366, 768)
+    bench.station.take([walking(300), looked()])
+    bench.add("exo-02", 7421).take([walking(300), looked()])
+
+    def draw() -> None:
+        for _ in range(3):
+            bench.draw(window)
+            rules.settle()
+
+    def stop_all() -> None:
+        bench.desk.stop_all("test")
+        for commands in bench.commands:
+            commands.answer(HELD)
+
+    def ask() -> None:
+        window.robots.cards[0].remove.click()
+
+    draw()
+    for step in (ask, stop_all) if is_open else (stop_all, ask):
+        step()
+        draw()
+    (question,) = (one for one in window.findChildren(Question) if one.isVisible())
+    assert window.stopped_all.isVisible()
+    assert covered(question, [window.stopped_all, *window.findChildren(StopButton)]) == []
+
+
 def test_a_question_leaves_a_stop_under_which_the_window_is_resized(
     window: MainWindow, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
