@@ -220,7 +220,8 @@ class Player(QWidget):
         self.signals.refresh()
         self.signals.show_around(explaining_signals(robot.description, channel), at_ns)
         if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
-            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + TOLD_NS)
+            a_row_ns = round(SECOND_NS / robot.rows_per_s) if robot.rows_per_s else 0
+            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + max(TOLD_NS, a_row_ns))
             self._playback.step()
 
     def _refresh_beside(self) -> None:
