@@ -236,10 +236,10 @@ def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, benc
     trial = bench.station.writing.trial
     assert trial is not None
     over_ns = trial.until_ns + 3_000_000_000
-    bench.station._back.look_if_over(over_ns)
+    bench.station.reverted.look_if_over(over_ns)
     assert bench.station.writing.trial is trial, "nobody has looked since its end"
     bench.station.take([looked(at_ns=over_ns)])
-    bench.station._back.look_if_over(over_ns)
+    bench.station.reverted.look_if_over(over_ns)
     panel.refresh()
     assert not panel.trial.isVisible()
     assert "the robot has taken it back" in panel.banner.text()

@@ -115,7 +115,7 @@ class Station:
         self._watched_ns = 0
         self._happened = FlagWatch()
         self._stalls = Stalls()
-        self._back = RevertedTrials(self.robot, self.writing, self.tell)
+        self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
 
@@ -232,10 +232,10 @@ class Station:
                     self._show_stop(event)
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
-                    self._back.look()
+                    self.reverted.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
-                    self._others.take(event.journal.entries)
+                    self._others.take(event.journal.entries, time.monotonic_ns())
                     self.stopping.read(event.journal.entries, self.robot.boot_id)
                 case Described():
                     self._described(event.description, before)
@@ -254,7 +254,9 @@ class Station:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self._look_for_alarms()  # now, so that it is known since when
-            self._back.look_if_over(now_ns)
+            self.reverted.look_if_over(now_ns)
+            self._others.own(*(() if self.experiment is None else self.experiment.writes))
+            self._others.look(now_ns)
 
     def _look_for_stalls(self, event: Telemetry) -> None:
         batch = event.batch
@@ -436,7 +438,7 @@ class Station:
         self._others.own(written.write)
         self.writing.done(written)
         self.robot.hold(written.after)
-        self._back.forget()
+        self.reverted.forget()
         self.edits.drop(*(change.name for change in changes))
         self.tell(NewsKind.PARAMETER, ", ".join(written_line(change, written) for change in changes))
 
@@ -454,7 +456,9 @@ class Station:
         if self.writing.trial is not None:
             before = self.writing.trial.before
             self._ask(
-                self._commands.revert(self.writing.trial.write), lambda _: self._back.began(before), "revert"
+                self._commands.revert(self.writing.trial.write),
+                lambda _: self.reverted.began(before),
+                "revert",
             )
 
     def stage_undo(self) -> None:

@@ -1,6 +1,6 @@
-"""Writes in a robot's journal that are not this window's: by a command, another window, or an experiment."""
+"""Writes in a robot's journal that are not this window's: by a command, or by another window."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from server_gui.core.desk.flags import FlagKind, of_recorded_journal
@@ -8,39 +8,47 @@ from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
 
 Entry = dict[str, Any]
+ANSWERED_NS: Final = 2_000_000_000  # by then a write of this window has been answered
 DONE: Final = frozenset({"write done", "trial begun"})
 
 
 class WritesOfOthers:
-    """Tells of each that succeeded, once; what was written before the journal was first read is no news."""
+    """Tells of each that succeeded, once; what stood in the journal when it was first read is no news.
+
+    The journal may be read before a write of this window is answered: each is told a little later.
+    """
 
     def __init__(self, robot: Robot, tell: Callable[[NewsKind, str], None]) -> None:
         self._robot = robot
         self._tell = tell
         self._own: set[int] = set()
         self._asked: dict[int, Entry] = {}
+        self._done: dict[int, tuple[int, Entry]] = {}  # when it was read, and the entry that began it
         self._newest: int | None = None  # number of the newest entry that was read
 
-    def own(self, write: int) -> None:
-        """Note the number of a write of this window, by the robot's answer."""
-        self._own.add(write)
+    def own(self, *writes: int) -> None:
+        """Note the numbers of writes of this window, by the robot's answers."""
+        self._own.update(writes)
 
-    def take(self, entries: Sequence[Entry]) -> None:
-        """Take the robot's newest entries, oldest first."""
+    def look(self, now_ns: int) -> None:
+        """Tell of those that nobody here has turned out to have asked for."""
+        due = [write for write, (read_ns, _) in self._done.items() if now_ns - read_ns >= ANSWERED_NS]
+        found = [self._done.pop(write)[1] for write in due]
+        others = [entry for write, entry in zip(due, found, strict=True) if write not in self._own]
         described = () if self._robot.description is None else self._robot.description.parameters
-        for flag in of_recorded_journal(self._found(entries), described):
+        for flag in of_recorded_journal(others, described):
             on_trial = ", on trial" if flag.kind is FlagKind.TRIAL else ""
             self._tell(NewsKind.PARAMETER, f"{flag.text}{on_trial}")
 
-    def _found(self, entries: Sequence[Entry]) -> Iterator[Entry]:
-        """Yield the entries that began such a write."""
+    def take(self, entries: Sequence[Entry], now_ns: int) -> None:
+        """Take the robot's newest entries, oldest first."""
         told = [(number, one) for one in entries if isinstance(number := one.get("n"), int)]
         if not told:
             return
         before, self._newest = self._newest, told[-1][0]
         is_history = before is None or self._newest < before  # the first look, or another journal
         if is_history:
-            self._own, self._asked = set(), {}
+            self._own, self._asked, self._done = set(), {}, {}
         for number, entry in told:
             write = entry.get("write")
             if not isinstance(write, int) or (not is_history and number <= (before or 0)):
@@ -49,5 +57,5 @@ class WritesOfOthers:
                 self._asked[write] = entry
             elif entry.get("what") in DONE:
                 asked = self._asked.pop(write, None)
-                if asked is not None and write not in self._own and not is_history:
-                    yield asked
+                if asked is not None and not is_history:
+                    self._done[write] = now_ns, asked

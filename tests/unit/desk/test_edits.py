@@ -148,14 +148,14 @@ def test_a_trial_is_over_when_the_robot_holds_the_old_values_again(
     over_ns = on_trial(bench)
     read_ns = over_ns + round(read_after_s * 1e9)
     bench.station.take([looked({**HELD, STEP: holds}, at_ns=read_ns)])
-    bench.station._back.look_if_over(over_ns + 10**11)
+    bench.station.reverted.look_if_over(over_ns + 10**11)
     assert said in bench.station.writing.text
     assert (bench.station.writing.trial is None) == (said != "on trial")
 
 
 def test_a_trial_whose_end_nobody_has_looked_at_is_not_over(bench: Bench) -> None:
     over_ns = on_trial(bench)
-    bench.station._back.look_if_over(over_ns + 10**11)
+    bench.station.reverted.look_if_over(over_ns + 10**11)
     assert bench.station.writing.trial is not None
 
 
