@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer
+from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.free_place import KEPT, free_place
@@ -13,7 +13,7 @@ from server_gui.views.widgets.visibility import is_seen
 
 WIDTHS: Final = (420, 500, 580, 700)  # of its words; the first for which there is room
 Watched = Sequence[QWidget]  # what is looked at while a question is answered
-MOVES: Final = (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show)
+LOOK_MS: Final = 100
 
 
 class Question(QDialog):
@@ -54,10 +54,10 @@ class Question(QDialog):
         column.addLayout(buttons)
         self._column = column
         (field or self.cancel).setFocus()
-        self._arranged = QTimer(self, singleShot=True)  # once the window has laid out what is in it
-        self._arranged.timeout.connect(lambda: self._leave_stops(parent.window()))
-        for one in (parent.window(), *_results(parent.window())):
-            one.installEventFilter(self)
+        self._before: list[QRect] = []  # where STOPs and their results were at the last look
+        looks = QTimer(self, interval=LOOK_MS)
+        looks.timeout.connect(lambda: self._leave_stops(parent.window()))
+        looks.start()
 
     def add(self, field: QLineEdit) -> None:
         """Add another field, above the buttons."""
@@ -70,20 +70,17 @@ class Question(QDialog):
         room = in_sight(window)
         stops: Watched = window.findChildren(StopButton)
         kept = [list(_seen(widgets)) for widgets in (stops, _results(window), *watched)]
+        self._before = kept[0] + kept[1]
         sizes = [self._fit(wide) + frame for wide in WIDTHS]
         place = free_place(sizes, room, kept)
         self._fit(WIDTHS[sizes.index(place.size())])
         self.move(place.topLeft())
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in MOVES:
-            self._arranged.start(0)
-        return False
-
     def _leave_stops(self, window: QWidget) -> None:
-        """Leave a STOP, or the result of one, that has come to lie under it; where there is none, stay."""
-        taken = self.frameGeometry()
-        if any(taken.intersects(one) for one in _seen([*window.findChildren(StopButton), *_results(window)])):
+        """Leave a STOP, or the result of one, that has come to lie under it; where none has moved, stay."""
+        now, taken = list(_seen([*window.findChildren(StopButton), *_results(window)])), self.frameGeometry()
+        before, self._before = self._before, now
+        if now != before and any(taken.intersects(one) for one in now):
             self.keep_in_sight(window, ())
 
     def _fit(self, wide: int) -> QSize:

@@ -4,16 +4,18 @@ import itertools
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSize
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import Stopped
-from server_gui.views.confirmation import Question
+from server_gui.views.confirmation import LOOK_MS, Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.free_place import free_place
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
+from tests.gui.running import wait
 from tests.support.desk import JOINTS, looked, walking
 
 ROOM = QRect(0, 0, 100, 100)
@@ -105,7 +107,37 @@ def test_a_question_leaves_the_result_of_stop_all_in_sight_whichever_comes_first
         draw()
     (question,) = (one for one in window.findChildren(Question) if one.isVisible())
     assert window.stopped_all.isVisible()
-    assert covered(question, [window.stopped_all, *window.findChildren(StopButton)]) == []
+    kept = [window.stopped_all, *window.findChildren(StopButton)]
+    wait(lambda: covered(question, kept) == [], "left them in sight")
+
+
+@pytest.mark.parametrize(("size", "scale"), [((1024, 700), 1.0), ((1024, 700), 2.0), ((1366, 768), 2.0)])
+def test_a_question_leaves_stops_that_come_with_another_panel(
+    window: MainWindow,
+    bench: Bench,
+    theme: Theme,
+    monkeypatch: pytest.MonkeyPatch,
+    size: tuple[int, int],
+    scale: float,
+) -> None:
+    """Opened beside the parameters, it lay over STOP ALL as soon as the robots were looked at."""
+    monkeypatch.setattr("server_gui.views.confirmation.in_sight", lambda _: window.geometry())
+    theme.set(scale=scale)
+    window.resize(*size)
+    bench.station.take([walking(300), looked()])
+    bench.add("exo-02", 7421).take([walking(300), looked()])
+    window.bring(window.docks[1])
+    bench.draw(window)
+    rules.settle()
+    window.header.reset.emit(bench.station)
+    (question,) = (one for one in window.findChildren(Question) if one.isVisible())
+    window.bring(window.docks[0])
+
+    def is_beside() -> bool:
+        bench.draw(window)
+        return window.robots.all_stop.isVisible() and covered(question, window.findChildren(StopButton)) == []
+
+    wait(is_beside, "left every STOP in sight")
 
 
 def test_a_question_leaves_a_stop_under_which_the_window_is_resized(
@@ -118,10 +150,9 @@ def test_a_question_leaves_a_stop_under_which_the_window_is_resized(
     (question,) = (one for one in window.findChildren(Question) if one.isVisible())
     before = question.frameGeometry()
     window.resize(1360, 760)
-    rules.settle()
+    QTest.qWait(3 * LOOK_MS)
     assert question.frameGeometry() == before, "it covers nothing: it stays"
     stop = next(one for one in window.findChildren(StopButton) if one.isVisible())
     question.move(on_screen(stop).topLeft())
     window.resize(1024, 700)
-    rules.settle()
-    assert covered(question, window.findChildren(StopButton)) == []
+    wait(lambda: covered(question, window.findChildren(StopButton)) == [], "left every STOP in sight")
