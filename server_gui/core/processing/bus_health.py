@@ -174,8 +174,9 @@ def _is_silent(node: NodeInfo) -> bool:
 
 
 def _nobody_answers(bus: BusInfo) -> bool:
-    """Return whether all of several nodes are silent: then it is the bus, and no drive is known."""
-    return len(bus.nodes) > 1 and all(map(_is_silent, bus.nodes))
+    """Return whether several nodes are asked, and all are silent: then it is the bus."""
+    asked = [node for node in bus.nodes if node.sdo_transfers or node.sdo_timeouts or node.findings]
+    return len(asked) > 1 and all(map(_is_silent, asked))
 
 
 def _misses(node: NodeInfo) -> bool:

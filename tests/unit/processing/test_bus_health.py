@@ -174,6 +174,8 @@ def test_where_no_node_answers_any_more_the_bus_fails() -> None:
     assert rated(bus) == [(BusHealthLevel.ALARM, "all 3 nodes: they answer no SDO", LOST.check)]
     well = replace(bus, nodes=[*nodes[:2], NODE])
     assert level(well) is BusHealthLevel.WARNING
+    never_asked = replace(NODE, node_id=9, sdo_transfers=0, sdo_timeouts=0)
+    assert level(replace(bus, nodes=[*nodes, never_asked])) is BusHealthLevel.ALARM, "it says nothing of them"
 
 
 def test_a_count_that_grows_is_told_by_the_page_alone_and_each_finding_has_its_own_level() -> None:
