@@ -1,14 +1,17 @@
 """Writes in a robot's journal that are not this window's: by a command, or by another window."""
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+from server_gui.core.alarms.marks import age_text
 from server_gui.core.desk.flags import FlagKind, of_recorded_journal
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
 
 Entry = dict[str, Any]
 ANSWERED_NS: Final = 2_000_000_000  # by then a write of this window has been answered
+LATE_S: Final = 10.0  # told later than that, it is said how long ago it was
 DONE: Final = frozenset({"write done", "trial begun"})
 
 
@@ -24,7 +27,7 @@ class WritesOfOthers:
         self._own: set[int] = set()
         self._asked: dict[int, Entry] = {}
         self._done: dict[int, tuple[int, Entry]] = {}  # when it was read, and the entry that began it
-        self._newest: int | None = None  # number of the newest entry that was read
+        self._newest: tuple[int, object] | None = None  # number and hash of the newest entry that was read
 
     def own(self, *writes: int) -> None:
         """Note the numbers of writes of this window, by the robot's answers."""
@@ -38,20 +41,22 @@ class WritesOfOthers:
         described = () if self._robot.description is None else self._robot.description.parameters
         for flag in of_recorded_journal(others, described):
             on_trial = ", on trial" if flag.kind is FlagKind.TRIAL else ""
-            self._tell(NewsKind.PARAMETER, f"{flag.text}{on_trial}")
+            ago_s = (time.time_ns() - flag.at_ns) / 1e9
+            since = f", {age_text(ago_s)} ago" if ago_s > LATE_S else ""
+            self._tell(NewsKind.PARAMETER, f"{flag.text}{on_trial}{since}")
 
     def take(self, entries: Sequence[Entry], now_ns: int) -> None:
         """Take the robot's newest entries, oldest first."""
         told = [(number, one) for one in entries if isinstance(number := one.get("n"), int)]
         if not told:
             return
-        before, self._newest = self._newest, told[-1][0]
-        is_history = before is None or self._newest < before  # the first look, or another journal
-        if is_history:
-            self._own, self._asked, self._done = set(), {}, {}
+        before, self._newest = self._newest, (told[-1][0], told[-1][1].get("hash"))
+        # The first look, or another journal: also where nobody can tell that it goes on.
+        is_history = before is None or before not in [(number, one.get("hash")) for number, one in told]
+        read = 0 if before is None or is_history else before[0]
         for number, entry in told:
             write = entry.get("write")
-            if not isinstance(write, int) or (not is_history and number <= (before or 0)):
+            if not isinstance(write, int) or number <= read:
                 continue
             if entry.get("what") == "write":
                 self._asked[write] = entry

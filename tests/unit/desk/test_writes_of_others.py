@@ -1,5 +1,6 @@
 """What others write to a robot is told in the window, once, and what it has written itself is not."""
 
+import time
 from typing import Any
 from unittest.mock import create_autospec
 
@@ -21,20 +22,19 @@ def read(others: WritesOfOthers, *entries: dict[str, Any]) -> None:
 
 
 def entry(number: int, what: str, write: int, **more: object) -> dict[str, Any]:
-    return {
-        "n": number,
-        "what": what,
-        "write": write,
-        "who": "gwrms set",
-        "hash": "",
-        "utc_ns": number,
-        **more,
-    }
+    of_all = {"n": number, "what": what, "write": write, "who": "gwrms set"}
+    return {**of_all, "hash": f"{number}", "utc_ns": time.time_ns(), **more}
 
 
 HISTORY = [entry(1, "write", 1), entry(2, "write done", 1)]
 BEGUN = entry(3, "write", 2, before={"left_knee.max_torque": 80.0}, after={"left_knee.max_torque": 40.0})
 SAID = "write left_knee.max_torque 80 → 40 by gwrms set"
+
+
+@pytest.fixture(autouse=True)
+def slow_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What these tests write is not late for half an hour."""
+    monkeypatch.setattr("server_gui.core.desk.writes_of_others.LATE_S", 1800.0)
 
 
 @pytest.fixture
@@ -92,6 +92,27 @@ def test_the_history_of_another_journal_is_no_news(others: WritesOfOthers, told:
     assert told == []
     read(others, *HISTORY, BEGUN, entry(4, "write done", 2))
     assert told == [SAID]
+
+
+def test_a_longer_journal_of_another_robot_is_its_history(others: WritesOfOthers, told: list[str]) -> None:
+    theirs = [entry(n, what, n // 2, hash=f"b{n}") for n, what in ((1, "x"), (4, "write"), (5, "write done"))]
+    read(others, *theirs)
+    assert told == []
+
+
+def test_an_own_write_and_one_that_waits_outlast_another_journal(
+    others: WritesOfOthers, told: list[str]
+) -> None:
+    others.own(7)
+    others.take([*HISTORY, BEGUN, entry(4, "write done", 2)], 0)
+    read(others, entry(1, "write", 7, hash="b"))
+    read(others, entry(1, "write", 7, hash="b"), entry(2, "write done", 7, hash="b"))
+    assert told == [SAID]
+
+
+def test_one_that_is_read_late_says_how_long_ago_it_was(others: WritesOfOthers, told: list[str]) -> None:
+    read(others, *HISTORY, BEGUN | {"utc_ns": time.time_ns() - 3600 * 10**9}, entry(4, "write done", 2))
+    assert told == [f"{SAID}, 60 min ago"]
 
 
 @pytest.mark.parametrize("is_own", [False, True])
