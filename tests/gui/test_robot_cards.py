@@ -208,6 +208,6 @@ def test_one_that_was_removed_while_enabled_stays_named_until_somebody_has_seen_
     if ends == "acknowledged":
         strip.acknowledge(next(told for told in strip.told if told[1].alarm.where == "exo-01"))
     else:
-        bench.add("exo-01", 7420)
+        bench.add("exo-01", 7420).take([described("exo-01"), walking(300), looked()])
     settle(around, bench)
     assert not any("removed: exo-01" in text for text in strip.texts)

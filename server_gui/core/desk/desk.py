@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from gateway.units import Units
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarm, Alarms
-from server_gui.core.alarms.texts import LEFT
+from server_gui.core.alarms.texts import LEFT, Kind
 from server_gui.core.cloud.store_reach import StoreReach
-from server_gui.core.desk.left import left_alarm
+from server_gui.core.desk.left import Left, left_alarm
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
@@ -44,8 +44,8 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
-        self.alarms = Alarms()  # of robots that were removed, and may be enabled
-        self._left: dict[str, Alarm] = {}  # the same by address
+        self._alarms = Alarms()
+        self._left: dict[tuple[Kind, str], Left] = {}
         self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
@@ -93,8 +93,7 @@ class Desk:
         return len(self.stations) > 1 or self.commissions()
 
     def add(self, station: Station) -> None:
-        """Add a robot; the first is selected, and one that was removed before is seen again."""
-        self._forget(station.address)
+        """Add a robot; the first is selected."""
         self.stations.append(station)
         station.neighbours = self.stations
         if self.selected is None:
@@ -102,15 +101,14 @@ class Desk:
 
     def remove(self, station: Station) -> None:
         """Look at it no more; another one is selected where it was."""
-        left = None if station.robot.is_recording else left_alarm(station)
         if not station.robot.is_recording:
+            left = left_alarm(station)
             station.tell(NewsKind.CONTROL, "removed" if left is None else f"removed {left.what}")
+            if left is not None:
+                self._left[left.key] = Left(left, station)
         if self._stop_all is not None:
             self._stop_all.remove(station)
         self.stations.remove(station)
-        if left is not None and station.address not in [one.address for one in self.stations]:
-            self._left[station.address] = left
-            self.alarms.look(self._left.values(), time.time())
         if self.selected is station:
             self.select(self.stations[0] if self.stations else None)
 
@@ -119,14 +117,16 @@ class Desk:
         if station is not None:
             station.acknowledge(alarm)
         elif alarm.kind in LEFT:
-            self._forget(alarm.subject)
+            self._left.pop(alarm.key, None)
         else:
             self.recording.alarms.acknowledge(alarm.key)
 
-    def _forget(self, address: str) -> None:
-        """Warn no more of a robot that was removed."""
-        if self._left.pop(address, None) is not None:
-            self.alarms.look(self._left.values(), time.time())
+    @property
+    def alarms(self) -> Alarms:
+        """Robots that were removed while they were not known to be off, until they are seen again here."""
+        self._left = {key: one for key, one in self._left.items() if not one.is_seen_in(self.stations)}
+        self._alarms.look((one.alarm for one in self._left.values()), time.time())
+        return self._alarms
 
     def select(self, station: Station | None) -> None:
         """Look at another robot. Staged edits belong to their robot and stay with it."""

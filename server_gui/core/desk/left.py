@@ -1,5 +1,7 @@
 """How a robot is left that is removed from the window: nobody sees or stops it there any more."""
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.alarms.alarm import Alarm
@@ -11,6 +13,24 @@ from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 
 GONE: Final = "its STOP is gone"
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """A robot that was removed, and the alarm of it."""
+
+    alarm: Alarm
+    station: Station
+
+    def is_seen_in(self, stations: Iterable[Station]) -> bool:
+        """Return whether the same robot is seen, and stopped, from here again.
+
+        One that was not known to have stopped stays named: a robot that is added tells nothing of that STOP.
+        """
+        known, called = self.station.robot.description is not None, self.station.called
+        live = (one for one in stations if one.is_live and one.address == self.station.address)
+        is_same = any(one.called == called or not known for one in live)
+        return is_same and self.alarm.kind is Kind.LEFT_RUNNING
 
 
 def left_alarm(station: Station) -> Alarm | None:

@@ -81,10 +81,10 @@ def test_what_is_not_known_to_be_off_is_named_and_how_it_was(
 ) -> None:
     how(bench)
     bench.desk.remove(bench.station)
-    told = [one.alarm for one in bench.desk.alarms.active]
-    assert [one.kind for one in told] == ([] if kind is None else [kind])
+    alarms = [one.alarm for one in bench.desk.alarms.active]
+    assert [one.kind for one in alarms] == ([] if kind is None else [kind])
     if kind is not None:
-        assert told[0].line == f"{kind.value}: exo-01: {words}: its STOP is gone"
+        assert alarms[0].line == f"{kind.value}: exo-01: {words}: its STOP is gone"
     assert bench.desk.news.items[0].text == (f"removed {words}: its STOP is gone" if words else "removed")
 
 
@@ -99,14 +99,39 @@ def test_one_of_two_that_was_left_is_acknowledged_alone(bench: Bench) -> None:
     assert [one.alarm for one in bench.desk.alarms.active] == [second]
 
 
-def test_one_that_is_in_the_list_twice_is_not_gone(bench: Bench) -> None:
-    bench.add("again").take([described("exo-01"), walking(10), looked()])
+def told(bench: Bench) -> list[Kind]:
+    return [one.alarm.kind for one in bench.desk.alarms.active]
+
+
+def test_one_that_is_in_the_list_twice_is_gone_only_where_nothing_is_seen_of_it(bench: Bench) -> None:
+    twin = bench.add("again")
     enabled(bench)
     bench.desk.remove(bench.station)
-    assert not bench.desk.alarms.active
+    assert told(bench) == [Kind.LEFT_RUNNING], "there is no link to the other"
+    twin.take([described("exo-01"), walking(10), looked()])
+    assert told(bench) == []
+
+
+@pytest.mark.parametrize("name", ["exo-01", "exo-77"])
+def test_one_that_is_added_again_is_named_until_it_is_seen_and_is_the_same(bench: Bench, name: str) -> None:
     enabled(bench)
     bench.desk.remove(bench.station)
-    assert bench.desk.alarms.active
+    again = bench.add("exo-01")
+    assert told(bench) == [Kind.LEFT_RUNNING]
+    again.take([described(name), walking(10), looked()])
+    assert told(bench) == ([] if name == "exo-01" else [Kind.LEFT_RUNNING]), (
+        "another robot says nothing of it"
+    )
+
+
+def test_a_stop_that_was_not_confirmed_is_not_forgotten_by_adding_its_robot_again(bench: Bench) -> None:
+    failed(bench)
+    bench.desk.remove(bench.station)
+    bench.add("exo-01").take([described("exo-01"), walking(10), looked()])
+    (one,) = bench.desk.alarms.active
+    assert one.alarm.kind is Kind.LEFT_UNSTOPPED
+    bench.desk.acknowledge(None, one.alarm)
+    assert told(bench) == []
 
 
 def test_a_stop_that_was_confirmed_and_is_not_held_by_the_robots_word_is_an_alarm(bench: Bench) -> None:
