@@ -10,6 +10,7 @@ from gateway.client import ConnectionState
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.beyond import FoundBeyond
 from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.drive_states import (
@@ -78,6 +79,7 @@ class Facts:
     stalls: Sequence[Stall] = ()
     danger: ShownDanger | None = None
     is_overloaded: bool = False  # this computer
+    beyond: Sequence[FoundBeyond] = ()
 
 
 def alarms(facts: Facts) -> Iterator[Alarm]:
@@ -101,6 +103,7 @@ def _found(facts: Facts) -> Iterator[Alarm]:
     yield from _of_those_that_come_up(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
+    yield from _of_beyond(facts)
     yield from _of_danger(facts)
     if not robot.is_recording:
         yield from stood_still(facts.stalls)
@@ -360,6 +363,30 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
     now = bus_health.seen(robot)
     for bus in robot.description.buses if now is None else now:
         yield from bus_alarms(bus, is_now=now is not None)
+
+
+# --- values beyond their limits
+
+
+def _of_beyond(facts: Facts) -> Iterator[Alarm]:
+    """Yield them; a robot without a wearer that it drives may lie as it is laid."""
+    robot = facts.robot
+    for one in facts.beyond:
+        if one.kind is Kind.FALLEN and undriven(robot, facts.stopping) == NONE_ENABLED:
+            continue
+        code = robot.values.get(f"{one.component}.error_code") or 0
+        if one.kind is Kind.HOT and _is_in_fault(robot, robot.parts[one.component]) and int(code) >> 12 == 4:
+            continue  # its drive says so itself
+        yield Alarm(
+            one.kind,
+            one.component,
+            one.what,
+            _where(robot, one.component),
+            _did(robot, facts.stopping),
+            check_of(one.kind),
+            channel=_channel(robot, one.component, None, (one.quantity,)),
+            is_now=not robot.is_stale(),
+        )
 
 
 # --- danger

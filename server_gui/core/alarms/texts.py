@@ -22,12 +22,15 @@ class Kind(Enum):
     NEVER_REACHED = "never reached"
     NO_LINK = "no link"
     FAULT = "fault"
+    FALLEN = "fallen?"
     GUARD = "guard tripped"
+    BEYOND = "beyond its ends"
     DANGER = "danger foreseen"
     IMPLAUSIBLE = "unreliable"
     LOST = "lost"
     NO_DATA = "no data yet"
     STALE = "stale"
+    HOT = "hot"
     BUS_FAILS = "bus fails"
     BUS_FULL = "bus full"
     NOT_RECORDED = "not recorded"
@@ -102,6 +105,24 @@ TEXTS: Final = dict(
         ),
         _text(
             Kind.FAULT, "square", "bad", "look into the drive's manual; note what the joint did just before"
+        ),
+        _text(
+            Kind.FALLEN,
+            "square",
+            "bad",
+            "look at the wearer now; if nobody has fallen, check how the IMU is mounted and its axes",
+        ),
+        _text(
+            Kind.BEYOND,
+            "square",
+            "bad",
+            "look at the joint now, STOP if in doubt; check its zero, its encoder and the ends (607Dh)",
+        ),
+        _text(
+            Kind.HOT,
+            "triangle",
+            "warn",
+            "do not touch it; let it cool, then check its load, its friction and its cooling",
         ),
         _text(
             Kind.GUARD,

@@ -9,7 +9,7 @@ from server_gui.core.alarms.unconfirmed import enabled_mark
 from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import StopProgress, StopState
 
-OF_PARTS: Final = frozenset({Kind.FAULT, Kind.IMPLAUSIBLE, Kind.LOST, Kind.PART_STALE})
+OF_PARTS: Final = frozenset({Kind.FAULT, Kind.IMPLAUSIBLE, Kind.LOST, Kind.PART_STALE, Kind.BEYOND, Kind.HOT})
 SHORT_WORDS: Final = {"component stale": "stale", "component silent": "silent"}
 RECORDING: Final = Mark("diamond", "accent", "a recording")
 STOP_SENT: Final = Mark("half", "warn", "STOP sent")

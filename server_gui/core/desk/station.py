@@ -19,6 +19,7 @@ from gateway.wire.robot import Description
 from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm, Alarms
+from server_gui.core.alarms.beyond import Beyond
 from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
@@ -115,6 +116,7 @@ class Station:
         self._watched_ns = 0
         self._happened = FlagWatch()
         self._stalls = Stalls()
+        self._beyond = Beyond()
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
@@ -181,7 +183,8 @@ class Station:
             return
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         is_busy, entries = self.is_overloaded(), self.audit.entries
-        facts = Facts(self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
+        beyond = self._beyond.look(self.robot)
+        facts = Facts(self.robot, self.stopping, self.address, entries, stalls, danger, is_busy, beyond)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(
@@ -254,6 +257,8 @@ class Station:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self._look_for_alarms()  # now, so that it is known since when
+            for one in self._beyond.news(self.robot):
+                self.tell(NewsKind.WARNING, f"{one.component}: {one.what}", one.component)
             self.reverted.look_if_over(now_ns)
             self._others.own(*(() if self.experiment is None else self.experiment.writes))
             self._others.look(now_ns)

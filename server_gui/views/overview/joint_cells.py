@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.units import Unit, rounded
+from server_gui.core.alarms.beyond import is_hot
 from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.severity import colour_of
 from server_gui.core.alarms.texts import error_text
@@ -98,7 +99,8 @@ def row_of(station: Station, joint: str, desk: Desk) -> list[Cell]:
 
 def _value(station: Station, joint: str, quantity: str, desk: Desk, *, stale: bool) -> Cell:
     value = station.robot.values.get(f"{joint}.{quantity}")
-    return Cell(_text(unit_of(desk, quantity), quantity, value), "old" if stale or value is None else "text")
+    known = "warn" if quantity == "temperature" and is_hot(value) else "text"
+    return Cell(_text(unit_of(desk, quantity), quantity, value), "old" if stale or value is None else known)
 
 
 def _text(unit: Unit, quantity: str, value: float | None) -> str:

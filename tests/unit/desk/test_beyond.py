@@ -1,0 +1,157 @@
+"""Values that are wrong whatever the robot does: a fall, a joint beyond its drive's ends, heat."""
+
+import math
+import time
+
+import pytest
+from msgspec.structs import replace
+
+from gateway.client import ConnectionState
+from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues
+from gateway.wire.robot import GuardInfo, GuardRuleInfo
+from server_gui.core.alarms import beyond
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import Described, LinkChanged, Looked
+from server_gui.core.follow.frame_time import one_moment
+from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking_bench
+
+LOW, HIGH = math.radians(-5.0), math.radians(120.0)
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return walking_bench(monkeypatch)
+
+
+def now(bench: Bench, **values: float | None) -> None:
+    """A row of now: `left_knee__position=2.0`."""
+    now_ns = time.monotonic_ns()
+    columns = {name.replace("__", "."): [value] for name, value in values.items()}
+    bench.look_again([telemetry([now_ns], columns, now_ns)])
+
+
+def told(station: Station, kind: Kind) -> Alarm | None:
+    with one_moment():
+        return next((one.alarm for one in station.alarms.active if one.alarm.kind is kind), None)
+
+
+def with_ends(station: Station, low: float = LOW, high: float = HIGH) -> None:
+    infos = [
+        ParameterInfo(
+            name, "rad", None, None, None, live=True, states=None, component="left_knee", object=at,
+            access="rw", store=True,
+        )
+        for name, at in (("left_knee.low", "0x607D:1"), ("left_knee.high", "0x607D:2"))
+    ]  # fmt: skip
+    held = {
+        name: ParameterValue(value, "rad", None, None, 1)
+        for name, value in (("left_knee.low", low), ("left_knee.high", high))
+    }
+    whole = looked()
+    station.take([Described(replace(described().description, parameters=infos))])
+    station.take([Looked(whole.quality, ParameterValues(held), whole.at_ns)])
+
+
+@pytest.mark.parametrize(
+    ("quantity", "degrees", "way"),
+    [("tilt_forward", 80.0, "forward"), ("tilt_forward", -75.0, "backward"), ("tilt_side", -88.0, "a side")],
+)
+def test_a_trunk_that_lies_is_a_fall_until_somebody_knows_better(
+    bench: Bench, quantity: str, degrees: float, way: str
+) -> None:
+    now(bench, **{f"trunk__{quantity}": math.radians(degrees)})
+    alarm = told(bench.station, Kind.FALLEN)
+    assert alarm is not None
+    assert f"{abs(degrees):.0f}° " in alarm.what
+    assert way in alarm.what
+    assert alarm.channel in ("trunk.tilt_forward", f"trunk.{quantity}")  # of those that it has
+    assert bench.station.mark.colour == "bad"
+    assert any(item.about == "trunk" and "leans" in item.text for item in bench.desk.news.items)
+
+
+def test_who_bends_to_stand_up_has_not_fallen(bench: Bench) -> None:
+    now(bench, trunk__tilt_forward=math.radians(55.0))
+    assert kinds(bench.station) == []
+
+
+def test_a_robot_whose_drives_are_all_off_may_lie_as_it_is_laid(bench: Bench) -> None:
+    now(bench, trunk__tilt_forward=1.5, **{f"{joint}__state": 6.0 for joint in JOINTS})
+    assert told(bench.station, Kind.FALLEN) is None
+    now(bench, trunk__tilt_forward=1.5, left_hip__state=4.0)
+    assert told(bench.station, Kind.FALLEN) is not None
+
+
+def test_a_joint_beyond_the_ends_of_its_drive_is_an_alarm(bench: Bench) -> None:
+    with_ends(bench.station)
+    now(bench, left_knee__position=math.radians(121.0), right_knee__position=math.radians(130.0))
+    assert told(bench.station, Kind.BEYOND) is None
+    now(bench, left_knee__position=math.radians(130.0))
+    alarm = told(bench.station, Kind.BEYOND)
+    assert alarm is not None
+    assert alarm.line == "beyond its ends: left knee: it is at 130°, its drive's range is −5° to 120°"
+    now(bench, left_knee__position=math.radians(-8.0))
+    alarm = told(bench.station, Kind.BEYOND)
+    assert alarm is not None
+    assert "at −8°" in alarm.what
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.0), (1.0, 1.0)])
+def test_ends_that_are_equal_are_none(bench: Bench, low: float, high: float) -> None:
+    with_ends(bench.station, low, high)
+    now(bench, left_knee__position=2.2)
+    assert told(bench.station, Kind.BEYOND) is None
+
+
+def test_a_hot_drive_is_told_and_is_over_some_seconds_after_it_has_cooled(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that swings about the limit is one alarm."""
+    now(bench, left_knee__temperature=98.8)
+    assert told(bench.station, Kind.HOT) is not None
+    now(bench, left_knee__temperature=84.9)
+    assert told(bench.station, Kind.HOT) is not None
+    later = time.time() + beyond.HELD_S
+    monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _: later)
+    now(bench, left_knee__temperature=84.9)
+    assert told(bench.station, Kind.HOT) is None
+
+
+def test_what_was_last_known_does_not_end_by_being_unknown(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now(bench, trunk__tilt_side=1.4)
+    robot, later = bench.station.robot, time.time() + 60.0
+    monkeypatch.setattr(robot.__class__, "is_stale", lambda *_: True)
+    monkeypatch.setattr(robot.__class__, "now_s", lambda _: later)
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    alarm = told(bench.station, Kind.FALLEN)
+    assert alarm is not None
+    assert not alarm.is_now
+
+
+@pytest.mark.parametrize("value", [None, math.nan])
+def test_what_is_not_known_is_beyond_nothing(bench: Bench, value: float | None) -> None:
+    with_ends(bench.station)
+    now(bench, left_knee__temperature=value, trunk__tilt_side=value, left_knee__position=value)
+    assert kinds(bench.station) == []
+
+
+def test_a_rule_of_a_guard_that_runs_decides_instead(bench: Bench) -> None:
+    rule = GuardRuleInfo(
+        "heat", "temperature", "above 110 °C", ["left_knee"], ["alarm"], "alarm", "watching", 0, None, 0, [],
+        quantities=["temperature"], high=110.0,
+    )  # fmt: skip
+    description = described().description
+    bench.station.take([Described(replace(description, guard=GuardInfo(configured=True, rules=[rule])))])
+    now(bench, left_knee__temperature=98.8, right_knee__temperature=98.8)
+    alarm = told(bench.station, Kind.HOT)
+    assert alarm is not None
+    assert alarm.subject == "right_knee"
+    broken = GuardInfo(configured=True, problem="no thread", rules=[rule])
+    bench.station.take([Described(replace(description, guard=broken))])
+    now(bench, left_knee__temperature=98.8, right_knee__temperature=20.0)
+    with one_moment():
+        hot = {one.alarm.subject for one in bench.station.alarms.active if one.alarm.kind is Kind.HOT}
+    assert "left_knee" in hot
