@@ -199,6 +199,60 @@ def test_an_instant_that_is_gone_is_not_shown_as_another_one(signals: Signals, b
     assert "gone" not in signals.said.text()
 
 
+def rows_until(bench: Bench, stamp_ns: int) -> None:
+    """More of the walk, up to this instant."""
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    stamps_ns = [*range(newest_ns + 10_000_000, stamp_ns + 1, 10_000_000)]
+    bench.station.take([telemetry(stamps_ns, {"left_knee.position": [0.2] * len(stamps_ns)}, stamp_ns)])
+
+
+def test_the_seconds_after_an_instant_are_shown_as_they_come(signals: Signals, bench: Bench) -> None:
+    """Who asked at once saw half of what was promised, for good."""
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.refresh()
+    assert "Shown until 5 s after it" in signals.said.text()
+    rows_until(bench, newest_ns + 2_000_000_000)
+    signals.refresh()
+    left, right = signals.plots[0].plot.window_s
+    assert right == pytest.approx(0.0, abs=0.01)
+    assert signals.scene.newest_ns == pytest.approx(newest_ns + 2_000_000_000, abs=10_000_000)
+    rows_until(bench, newest_ns + 9_000_000_000)
+    signals.refresh()
+    assert signals.scene.newest_ns == pytest.approx(newest_ns + 4_000_000_000, abs=20_000_000)
+    signals.read_now()
+    signals.refresh()
+    assert "Paused" in signals.said.text()
+    _left, right = signals.plots[0].plot.window_s
+    assert right == pytest.approx(0.0, abs=0.02)
+    rows_until(bench, newest_ns + 12_000_000_000)
+    signals.refresh()
+    assert signals.scene.newest_ns == pytest.approx(newest_ns + 4_000_000_000, abs=20_000_000)
+
+
+@pytest.mark.parametrize("elsewhere", ["zoom", "pause"])
+def test_who_looks_elsewhere_is_not_taken_back_to_an_instant(
+    signals: Signals, bench: Bench, elsewhere: str
+) -> None:
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.refresh()
+    if elsewhere == "zoom":
+        signals._zoomed(-2.0, -1.0)
+    else:
+        signals.pause.setChecked(False)
+    rows_until(bench, newest_ns + 2_000_000_000)
+    signals.refresh()
+    if elsewhere == "zoom":
+        assert signals.plots[0].plot.window_s == pytest.approx((-2.0, -1.0))
+        assert signals.scene.newest_ns == newest_ns
+    else:
+        assert signals.scene.frozen is None
+
+
 def test_where_the_page_is_small_an_instant_is_shown_above_what_arranges_it(
     theme: Theme, bench: Bench
 ) -> None:

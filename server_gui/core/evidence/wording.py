@@ -73,20 +73,14 @@ def word(told: EditEvidence) -> str:
 def strides(evidence: Evidence) -> str:
     """Return the numbers of compared strides; those since the revert have the old values, too.
 
-    Where they are not enough, those that are too few come first, and how many it takes.
+    Where they are not enough, also how many it takes.
     """
     before, after, back = evidence.cycles_before, evidence.cycles_after, evidence.cycles_back
-    if evidence.word is Word.FEW and min(before, after) < 2 * FEWEST:
-        old = f"{before - back} before and {back} since it was taken back" if back else f"{before} before"
-        with_it = f"{after} with it"
-        few, others = (with_it, old) if after <= before else (old, with_it)
-        few = few.replace(" ", " gait cycles " if few.partition(" ")[0] != "1" else " gait cycle ", 1)
-        return f"{few}, and it takes {FEWEST} of each leg; {others}"
-    if not back:
-        return f"{counted(before, 'gait cycle')} before, {after} after"
-    return (
-        f"{counted(before - back, 'gait cycle')} before and {back} since it was taken back, {after} with it"
-    )
+    old = f"{before - back} before it, {back} since it was taken back" if back else f"{before} before it"
+    said = f"{counted(after, 'gait cycle')} with it, {old}"
+    if evidence.word is not Word.FEW or min(before, after) >= 2 * FEWEST:
+        return said
+    return f"{said}; it takes {FEWEST} of each leg, with and without it"
 
 
 def number(value: float | None) -> str:

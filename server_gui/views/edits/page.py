@@ -51,14 +51,14 @@ NONE: Final = (
     "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
     "torque and gait is judged here, stride by stride, before and after."
 )
-COLOURS: Final = "{}, over a stride from 0 to 100 %; {}the bands are one standard deviation of the strides"
-DASHED: Final = f"dashed where there are fewer than {FEWEST} strides; "
+COLOURS: Final = "A stride, from 0 to 100 % of it · {}{} · bands: ± one standard deviation"
+DASHED: Final = f" · dashed: fewer than {FEWEST} strides"
 AGAIN: Final = "Try it again…"
 AGAIN_TIP: Final = "Stage the same value again, and open its review: nothing is sent before"
 EDIT: Final = re.compile(
     r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
 )  # when, and its id for the command
-BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
+BACK: Final = ", also since it was taken back"
 
 
 class Edits(QWidget):
@@ -254,8 +254,7 @@ class Edits(QWidget):
             set_text(self.words, with_minus("\n".join(_said(told))))
             sides = (side for one in told.curves for side in (one.before, one.after) if side is not None)
             dashed = DASHED if any(side.cycles < FEWEST for side in sides) else ""
-            more = dashed + (BACK if told.evidence.cycles_back else "")
-            set_text(self._legend, COLOURS.format(_sides(told), more))
+            set_text(self._legend, COLOURS.format(_sides(told), dashed))
         set_tip(self.words, "" if told is None else with_minus("\n".join(map(_in_unit, _strong(told)))))
         tried = None if told is None else told.experiment
         self.response.setVisible(tried is not None and self.response.show_response(tried))
@@ -332,9 +331,11 @@ class Edits(QWidget):
 
 def _sides(told: EditEvidence) -> str:
     """Return what is drawn in which colour."""
+    old = f"grey: the old value{BACK if told.evidence.cycles_back else ''}"
     if not any(one.before for one in told.curves):
-        return "in colour after; no stride before is known"
-    return "grey before, in colour after" if any(one.after for one in told.curves) else "grey before"
+        old = "no stride with the old value is known"
+    new = "blue: the new value" if any(one.after for one in told.curves) else ""
+    return " · ".join(filter(None, (new, old)))
 
 
 def _when(utc_ns: int) -> str:

@@ -79,6 +79,8 @@ class Signals(QWidget):
         self._begun, self._pace = False, RefreshRate()
         self._jumped_ns: int | None = None  # on the robot's clock
         self._jumped_flags: list[Flag] = []  # what had happened in what was kept then
+        self._rest_ns: int | None = None  # how long after it is awaited, while that has not all come
+        self._shown: tuple[float, float] | None = None  # of the time, as it was shown by itself
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
@@ -142,6 +144,7 @@ class Signals(QWidget):
             return
         self._look_beside()
         self._look(station)
+        self._take_the_rest(station)
         self.scene.look_for_trigger(self._seconds)
         draw(self.scene, self.cards, station, self._seconds, self._window)
         if self._pace.is_due(station):
@@ -317,7 +320,7 @@ class Signals(QWidget):
             plot.plot.set_seconds(self._seconds)
 
     def _paused(self, on: bool) -> None:
-        self._jumped_ns, self._jumped_flags, self._is_gone = None, [], False
+        self._jumped_ns, self._jumped_flags, self._is_gone, self._rest_ns = None, [], False, None
         self.scene.go_on()
         if on:
             self.scene.freeze()
@@ -411,8 +414,29 @@ class Signals(QWidget):
         self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
         self._jumped_ns = stamp_ns
         self._jumped_flags = list(self._desk.selected.flags)
+        is_all = at + around_s <= 0.0 or self._desk.selected.robot.is_recording
+        self._rest_ns, self._shown = None if is_all else round(around_s * 1e9), self._window
         self.read_now()
         return True
+
+    def _take_the_rest(self, station: Station) -> None:
+        """Show what comes of the seconds after the instant that was asked for, unless one looks elsewhere."""
+        newest_ns, frozen = station.rings.newest_ns, self.scene.frozen
+        if self._rest_ns is None or self._jumped_ns is None or newest_ns is None:
+            return
+        if frozen is None or frozen.source is not station.rings.source or self._window != self._shown:
+            self._rest_ns = None
+            return
+        if newest_ns == frozen.newest_ns:
+            return
+        end_s = station.rings.seconds(self._jumped_ns + self._rest_ns)
+        self.scene.freeze(end_s)
+        at, around_s = (self._jumped_ns - (self.scene.newest_ns or 0)) / 1e9, self._rest_ns / 1e9
+        self._zoomed(max(at - around_s, -self._seconds), min(at + around_s, 0.0))
+        self._shown = self._window
+        self._jumped_flags = list(dict.fromkeys([*self._jumped_flags, *station.flags]))
+        if newest_ns - self._jumped_ns >= self._rest_ns:
+            self._rest_ns = None
 
     def _turn(self, way: int) -> None:
         """Turn to the next event, or the one before: of where one has jumped to, else of the newest."""
@@ -490,6 +514,8 @@ class Signals(QWidget):
     def _state(self, station: Station) -> str:
         more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
+        if self._rest_ns is not None:
+            return f"Shown until {self._rest_ns / 1e9:.0f} s after it{many}"
         if self.pause.isChecked() or self.scene.frozen is not None:
             goes_on = "" if station.robot.is_recording else ", data continue"
             return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}{goes_on}{many}"

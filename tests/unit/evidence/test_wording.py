@@ -6,6 +6,9 @@ from server_gui.core.evidence.comparison import FEWEST, Evidence, Measured, Word
 from server_gui.core.evidence.wording import interval, share, strides
 
 
+TAKES = "it takes 8 of each leg, with and without it"
+
+
 @pytest.mark.parametrize(
     ("before", "difference", "half", "unit", "said"),
     [
@@ -32,13 +35,13 @@ def test_percent_is_of_what_was_before(
             13,
             3,
             4,
-            "3 gait cycles with it, and it takes 8 of each leg; 9 before and 4 since it was taken back",
+            f"3 gait cycles with it, 9 before it, 4 since it was taken back; {TAKES}",
         ),
-        (40, 1, 0, "1 gait cycle with it, and it takes 8 of each leg; 40 before"),
-        (5, 40, 0, "5 gait cycles before, and it takes 8 of each leg; 40 with it"),
+        (40, 1, 0, f"1 gait cycle with it, 40 before it; {TAKES}"),
+        (5, 40, 0, f"40 gait cycles with it, 5 before it; {TAKES}"),
     ],
 )
-def test_of_cycles_that_are_not_enough_those_come_first_that_decide(
+def test_of_cycles_that_are_not_enough_it_is_said_how_many_it_takes(
     before: int, after: int, back: int, said: str
 ) -> None:
     found = Evidence(Word.FEW, "", (), before, after, cycles_back=back)
