@@ -216,7 +216,7 @@ def test_the_seconds_after_an_instant_are_shown_as_they_come(signals: Signals, b
     assert "Shown until 5 s after it" in signals.said.text()
     rows_until(bench, newest_ns + 2_000_000_000)
     signals.refresh()
-    left, right = signals.plots[0].plot.window_s
+    _left, right = signals.plots[0].plot.window_s
     assert right == pytest.approx(0.0, abs=0.01)
     assert signals.scene.newest_ns == pytest.approx(newest_ns + 2_000_000_000, abs=10_000_000)
     rows_until(bench, newest_ns + 9_000_000_000)

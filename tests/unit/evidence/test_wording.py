@@ -5,7 +5,6 @@ import pytest
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Measured, Word
 from server_gui.core.evidence.wording import interval, share, strides
 
-
 TAKES = "it takes 8 of each leg, with and without it"
 
 
