@@ -90,7 +90,7 @@ def test_a_robot_that_is_linked_again_is_not_said_to_have_no_link_now(bench: Ben
     bench.first.fail(NotConnected(f"nothing was sent; {MANY}"))
     bench.look_again([walking(100), looked()])
     (alarm,) = (one.alarm for one in bench.station.alarms.active if one.alarm.kind is Kind.STILL_MOVING)
-    assert alarm.line.endswith("STOP again; the STOP before failed: there was no link")
+    assert alarm.line.endswith("STOP again; the last STOP failed: there was no link")
     assert alarm.brief == "STILL MOVING: STOP again"
 
 

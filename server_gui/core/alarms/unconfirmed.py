@@ -78,7 +78,7 @@ def unconfirmed_alarm(robot: Robot, stopping: StopProgress) -> Alarm:
     aside = ""
     if kind is Kind.STILL_MOVING:
         to_do = USE_HARDWARE if stopping.is_outdated else STOP_AGAIN
-        what, more, aside = to_do, "", f"the STOP before failed: {_then(stopping.why)}"
+        what, more, aside = to_do, "", f"the last STOP failed: {_then(stopping.why)}"
     elif silent := silent_controllers(robot, stopping):
         what, more = silent, ""
     else:

@@ -1,7 +1,7 @@
 """Progress of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -99,9 +99,10 @@ class StopProgress:
     drives: int = 0  # that have confirmed it
     silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
+    _sent_s: float | None = None  # UTC: of the latest STOP
     _heard_ns: int = 0  # when one was first known to be held by the robot's word, not by our STOP's answer
     _off: set[str] = field(default_factory=set)  # drives that were not enabled when it was sent
-    _confirmed: Collection[str] = ()  # drives that have confirmed it
+    _confirmed: Set[str] = frozenset()  # drives that have confirmed it
     _clock: ClockOffset | None = None  # of the robot when it was sent
     _boot_id: str | None = None  # likewise
     _reads: int = 0  # of the journal, since it was sent
@@ -141,10 +142,12 @@ class StopProgress:
         else:
             now_ns = time.monotonic_ns()
             self.at_ns = now_ns if at_ns is None else at_ns
-            self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
+            self._sent_s = time.time() - (now_ns - self.at_ns) / 1e9
+            if not self.held or self.since_s is None:
+                self.since_s = self._sent_s
             self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, set(off), clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
-        self.silent, self._confirmed, self.was_ended, self._is_written = (), (), False, False
+        self.silent, self._confirmed, self.was_ended, self._is_written = (), frozenset(), False, False
         self.is_outdated = False
         return self.number
 
@@ -169,12 +172,14 @@ class StopProgress:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
+            if self._confirmed - self._off:
+                self.since_s = self._sent_s  # else it has stood since the one that is held
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def failed(self, number: int, reason: str) -> None:
         """Note that nobody answered: consider the robot not stopped."""
         if number == self.number:
-            self.silent, self._confirmed = (), ()
+            self.silent, self._confirmed = (), frozenset()
             self._not_confirmed(reason)
 
     def was_reset(self, held: bool, at_s: float | None = None) -> None:
@@ -182,7 +187,8 @@ class StopProgress:
         self.held = held
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
-            self.silent, self._confirmed, self.is_outdated = (), (), False  # they say nothing of the next one
+            self.silent, self._confirmed = (), frozenset()  # they say nothing of the next one
+            self.is_outdated = False
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
 
     # --- what the robot shows meanwhile
@@ -397,7 +403,7 @@ class StopProgress:
             self._heard_ns = time.monotonic_ns()
 
     def _not_confirmed(self, why: str) -> None:
-        self.state, self.why = StopState.NOT_CONFIRMED, why
+        self.state, self.why, self.since_s = StopState.NOT_CONFIRMED, why, self._sent_s
         self.text = f"STOP NOT CONFIRMED: {why}{'' if why.endswith('?') else '.'} Use the hardware stop"
 
 

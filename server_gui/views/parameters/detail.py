@@ -193,7 +193,12 @@ def _round(value: float, span: float, scale: float, unit: Unit) -> float:
 def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | None) -> str:
     held = station.robot.parameters.get(info.name)
     robot = "–" if current is None else f"{brief(unit, current)} {unit.symbol}".rstrip()
-    step = "" if info.max_step is None else f" · one write moves it by at most {brief(unit, info.max_step)}"
+    symbol = unit.symbol
+    step = (
+        ""
+        if info.max_step is None
+        else f" · one write moves it by at most {brief(unit, info.max_step)} {symbol}".rstrip()
+    )
     live = "may be changed while it moves" if info.live else "only while its drive is at rest"
     staged = station.edits.staged.get(info.name)
     problem = (
@@ -208,5 +213,5 @@ def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | 
     row = None if station.file is None else station.file.rows.get(info.name)
     file = "" if row is None or row.file is None else f" · file {brief(unit, row.file)}"
     low, high = ("–" if end is None else brief(unit, end) for end in (info.min, info.max))
-    limits = f" · from {low} to {high}"
+    limits = f" · from {low} to {high} {symbol}".rstrip()
     return f"robot {robot}{limits}{default}{file} · {stored} · {live}{step} · object {info.object}{said}"

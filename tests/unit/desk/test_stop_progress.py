@@ -7,7 +7,8 @@ from gateway.client import ClockOffset
 from gateway.wire.stop import Stopped
 from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
-ALL = Stopped({"left_knee": "confirmed", "right_knee": "confirmed"}, held=True)
+JOINTS = ("left_knee", "right_knee")
+ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 
 def written(number: int, what: str, **more: object) -> dict[str, object]:
@@ -275,3 +276,26 @@ def test_a_stop_by_an_outdated_file_is_not_confirmed() -> None:
     stopping.answered(stopping.sent(), msgspec.structs.replace(ALL, outdated="robot.toml: is broken"))
     assert stopping.state is StopState.NOT_CONFIRMED
     assert stopping.why == "robot.toml: is broken"
+
+
+def test_a_stop_of_what_is_stopped_does_not_make_it_stopped_since_now() -> None:
+    """The line said since now, the alarm since when it was."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping.since_s = first_s = 1000.0
+    stopping.answered(stopping.sent(off=JOINTS), ALL)
+    assert stopping.since_s == first_s
+    assert stopping.text == "STOP confirmed by all 2 drives, already off"
+    stopping.answered(stopping.sent(off=JOINTS[:1]), ALL)  # the other one had been enabled again
+    assert stopping.since_s is not None
+    assert stopping.since_s > first_s
+
+
+def test_a_stop_that_fails_while_another_is_held_is_not_confirmed_since_now() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping.since_s = first_s = 1000.0
+    stopping.failed(stopping.sent(off=JOINTS), "no link")
+    assert stopping.state is StopState.NOT_CONFIRMED
+    assert stopping.since_s is not None
+    assert stopping.since_s > first_s

@@ -40,7 +40,7 @@ def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(ben
     assert "MOVING" not in bench.station.alarms.active[0].alarm.line
     bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
     (alarm,) = (one.alarm for one in bench.station.alarms.active)
-    assert alarm.line.startswith("STILL MOVING: STOP again; the STOP before failed: there is no link")
+    assert alarm.line.startswith("STILL MOVING: STOP again; the last STOP failed: there is no link")
     assert alarm.did == "all 6 drives enabled"
     assert bench.station.mark.word == "STILL MOVING"
 
