@@ -62,6 +62,7 @@ class LinkStatistics:
         self._received_per_s: float | None = None
         self._monitor = LinkMonitor()
         self._clock: ClockOffset | None = None
+        self._flows_since = 0  # second of the first row of this link
         self._recent: collections.deque[tuple[int, int]] = collections.deque(
             maxlen=RATE_S + 1
         )  # second, rows
@@ -85,7 +86,7 @@ class LinkStatistics:
                 if self._since_s is None or linked or self.state is ConnectionState.CONNECTED:
                     self._since_s = time.time()
                 self.state, self._problem = event.state, event.problem
-                self._received_per_s = None
+                self._received_per_s, self._flows_since = None, 0
                 self._monitor.state(event.state, event.problem, event.at_ns)
 
     def report(self, session: str) -> LinkReport:
@@ -132,11 +133,14 @@ class LinkStatistics:
             self._stream, self._dropped_before = stream, self._dropped
         self._dropped = self._dropped_before + batch.dropped
         second = batch.received_ns // SECOND_NS
+        self._flows_since = self._flows_since or second
         if not self._recent or self._recent[-1][0] != second:
             self._recent.append((second, 0))
         self._recent[-1] = (second, self._recent[-1][1] + rows)
 
     def _rows_per_s(self, now_ns: int) -> float:
-        """Over the last whole seconds."""
+        """Over the last whole seconds, of those that followed the link's first row; 0 before one is whole."""
         now = now_ns // SECOND_NS
-        return sum(rows for second, rows in self._recent if now - RATE_S <= second < now) / RATE_S
+        first = max(now - RATE_S, self._flows_since + 1)
+        rows = sum(rows for second, rows in self._recent if first <= second < now)
+        return rows / (now - first) if self._flows_since and first < now else 0.0

@@ -92,6 +92,24 @@ def test_rows_a_second_are_those_of_the_last_whole_seconds(monkeypatch: pytest.M
     assert counted.report("").rows_per_s == 0.0
 
 
+def test_the_first_seconds_of_a_link_are_no_part_of_a_slow_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording began with 17 rows a second where 100 came."""
+    counted = LinkStatistics(Address())
+    counted.take(LinkChanged(ConnectionState.CONNECTED, None, 100 * SECOND_NS))
+    counted.take(telemetry(1, 1, 0, at_s=100))  # of a second that had begun before
+    monkeypatch.setattr("time.monotonic_ns", lambda: 101 * SECOND_NS - 1)
+    assert counted.report("").rows_per_s == 0.0, "not known before a second is whole"
+    for seq in range(50):
+        counted.take(telemetry(1, 1, seq, at_s=101))
+    monkeypatch.setattr("time.monotonic_ns", lambda: 102 * SECOND_NS)
+    assert counted.report("").rows_per_s == 100.0
+    counted.take(LinkChanged(ConnectionState.WAITING, "closed", 102 * SECOND_NS))
+    counted.take(LinkChanged(ConnectionState.CONNECTED, None, 103 * SECOND_NS))
+    counted.take(telemetry(2, 1, 0, at_s=103))
+    monkeypatch.setattr("time.monotonic_ns", lambda: 104 * SECOND_NS - 1)
+    assert counted.report("").rows_per_s == 0.0
+
+
 def test_what_came_over_the_network_is_counted_whatever_became_of_it() -> None:
     counted = LinkStatistics(Address())
     counted.take(LinkChanged(ConnectionState.CONNECTED, None, SECOND_NS))
