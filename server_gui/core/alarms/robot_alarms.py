@@ -197,7 +197,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
     if not _is_in_fault(robot, part):
         return
     said, code = _cause(robot, part)
-    what, more = _advised(said_of_missed(code, said))
+    what, more = split_advice(said_of_missed(code, said))
     check = check_of(Kind.FAULT) if code is None else error_check(code)
     yield Alarm(
         Kind.FAULT,
@@ -253,7 +253,7 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         yield Alarm(Kind.UNKNOWN, part.name, what, where, check=check_of(Kind.UNKNOWN), is_now=is_now)
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
-    what, advice = _advised(problem)
+    what, advice = split_advice(problem)
     if problem.startswith("it reports ") and (found := _CODE.search(problem)) is not None:
         what = said_of_missed(int(found[1], 16), what) if ";" not in what else what
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
@@ -288,7 +288,7 @@ def _of_silent(robot: Robot) -> Iterator[Alarm]:
         )
 
 
-def _advised(problem: str) -> tuple[str, str]:
+def split_advice(problem: str) -> tuple[str, str]:
     """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`.
 
     What goes on after an advice belongs to it, unless it begins as only what is wrong does.

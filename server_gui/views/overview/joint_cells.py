@@ -7,6 +7,7 @@ from typing import Final
 from gateway.units import Unit, rounded
 from server_gui.core.alarms.beyond import is_hot
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.robot_alarms import split_advice
 from server_gui.core.alarms.severity import colour_of
 from server_gui.core.alarms.texts import error_text
 from server_gui.core.alarms.unconfirmed import enabled_mark
@@ -166,7 +167,7 @@ def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
         return Cell(said, "old" if stale else colour, None, "\n".join(filter(None, (problem, said))))
     if part.state != "ok" and problem:
         told = CODE.match(problem.removeprefix(IN_FAULT))  # also where the code is not among what is sent
-        said = told[0].strip() if told else problem
+        said = told[0].strip() if told else split_advice(problem)[0]
         return Cell(said, "old" if not station.is_live else colour, None, problem)
     if stale:
         return Cell(NOT_KNOWN, "old")
