@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,7 +88,8 @@ def _window(own: DemoRobot, options: Options, folder: Path, check: Callable[[], 
     from server_gui.views.frame.application import application, kept_settings, kept_theme
 
     steps = FirstSteps(
-        _tell, [step for step in FirstStep if step is not FirstStep.WALK or options.scenario == WALKS]
+        partial(_tell_window, own),
+        [step for step in FirstStep if step is not FirstStep.WALK or options.scenario == WALKS],
     )
     qt = application()
     splash = Splash(steps, kept_theme(qt, kept_settings()))
@@ -124,11 +126,22 @@ def _tell(step: FirstStep, took_s: float) -> None:
     print_line(f"{took_s:5.1f} s  {DONE[step]}")
 
 
+def _tell_window(own: DemoRobot, step: FirstStep, took_s: float) -> None:
+    _tell(step, took_s)
+    if step is FirstStep.DATA and own.address is not None:
+        _tell_address(own.address)
+
+
+def _tell_address(address: Address) -> None:
+    print_line(f"gwrms demo: from another terminal: gwrms describe --robot {address}")
+
+
 def _in_terminal(own: DemoRobot, options: Options, check: Callable[[], None]) -> None:
     steps = FirstSteps(_tell, SHOWN_ONLY)
     from server_gui.terminal.followed_robot import FollowedRobot  # while the others start
 
     address = _started(own, steps, check)
+    _tell_address(address)
 
     def check_all() -> None:
         check()
