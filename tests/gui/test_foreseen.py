@@ -142,7 +142,7 @@ def test_where_too_little_was_labelled_that_is_said_and_no_percentage(
     assert line.text == "Walk", "not checked: as little as without any label"
     assert line.detail.startswith(f"predicted, too little labelled to tell ({basis})")
     assert line.short == "predicted, too little labelled to tell"
-    assert f"too little labelled to tell: {basis}, needs 1 min in 2" in line.tip
+    assert f"too little labelled to tell: {basis}; it takes 1 min in 2" in line.tip
     assert "100" not in line.text + line.detail + line.short + line.tip
 
 

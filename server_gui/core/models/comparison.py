@@ -104,7 +104,7 @@ def unknown_to(one: Card, others: Iterable[Card], whose: str) -> str:
 def last_week(entry: Entry) -> str:
     """Return the share of its recent correct predictions, in words; without labels, no number."""
     if not entry.hits:
-        return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
+        return f"not known: nobody has labelled any of what it said within {WITHIN_DAYS} days"
     return "; ".join(
         f"{robot}: {quality.last_week}{_but(entry, quality)}" for robot, quality in sorted(entry.hits.items())
     )
@@ -125,10 +125,10 @@ def _week_of(entry: Entry, quality: Quality) -> str:
 
 def _but(entry: Entry, quality: Quality) -> str:
     """Return which classes were not among the labels, so that nothing is known of them."""
-    if not quality.confusion:
-        return ""
+    if not quality.confusion or not quality.is_enough:
+        return ""  # nothing is known of any then
     missing = [class_name(name) for name in entry.card.classes if name not in quality.confusion]
-    return f"; none of it labelled {', '.join(missing)}" if missing else ""
+    return f"; no label says {', '.join(missing)}" if missing else ""
 
 
 def usual_other(entry: Entry, found: Catalogue) -> Entry | None:

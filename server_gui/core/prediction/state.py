@@ -50,7 +50,7 @@ class Quality(Struct, frozen=True):
     def last_week(self) -> str:
         """How right a model is, in words and by what; that too little was labelled where that is so."""
         if not self.is_enough:
-            return f"{TOO_LITTLE}: {self.basis}, needs {LEAST_S // 60} min in {LEAST_RECORDINGS}"
+            return f"{TOO_LITTLE}: {self.basis}; it takes {LEAST_S // 60} min in {LEAST_RECORDINGS}"
         right, wrong, unsaid = self.shares
         return f"{right} right, {wrong} wrong, {unsaid} not said of {self.basis}"
 

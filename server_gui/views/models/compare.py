@@ -34,7 +34,7 @@ from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 
-TITLES: Final = ("", "This model", "Other", "Points", "", "Decisions")
+TITLES: Final = ("", "This model", "Other", "Points", "Verdict", "Decisions")
 NAME, ONE, OTHER, DIFFERENCE, VERDICT, DECISIONS = range(len(TITLES))
 MARKS: Final = {
     "better": ("▲ better", "good"),

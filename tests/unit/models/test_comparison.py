@@ -95,7 +95,7 @@ def test_the_error_of_a_phase_is_less_when_it_is_better() -> None:
 
 def test_last_week_is_not_known_where_nobody_has_labelled_it() -> None:
     unknown = entry()
-    assert last_week(unknown) == "not known: nothing that it said within 7 days was labelled"
+    assert last_week(unknown) == "not known: nobody has labelled any of what it said within 7 days"
     assert week_short(unknown) == "not labelled"
     quality = Quality(200, 192, 6, 2, {}, seconds=200, recordings=2)
     known = Entry(card(), "a", False, (), "", {"exo-01": quality})
@@ -108,7 +108,7 @@ def test_labels_of_one_class_alone_prove_nothing_of_the_others() -> None:
     steady = Quality(200, 200, 0, 0, {"steady": {"steady": 200}}, seconds=200, recordings=2)
     one = Entry(card(classes=("steady", "near_fall", "fall")), "a", False, (), "", {"exo-01": steady})
     assert week_short(one) == "only steady labelled"
-    assert last_week(one).endswith("in 2 recordings; none of it labelled near fall, fall")
+    assert last_week(one).endswith("in 2 recordings; no label says near fall, fall")
     both = Quality(4, 4, 0, 0, {"steady": {"steady": 2}, "fall": {"fall": 2}})
     two = dataclasses.replace(one, hits={"exo-01": steady, "exo-02": both})
     assert week_short(two) == "exo-01 only steady labelled, exo-02 too little labelled to tell"
