@@ -26,7 +26,7 @@ from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.marks import Mark
-from server_gui.views.overview.joint_cells import ANGLE, ERROR, STATE, STOP, TORQUE
+from server_gui.views.overview.joint_cells import ANGLE, ERROR, STATE, STOP, TORQUE, row_of
 from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import PredictionRow, lines
@@ -297,6 +297,18 @@ def test_proof_of_a_stop_stands_at_each_joint(theme: Theme, bench: Bench) -> Non
     bench.station.stopping.proofs = {"left_knee": Proof(38.4, "quick stop active")}
     assert cells(model, 1)[STOP] == "38 ms"
     assert cells(model, 0)[STOP] == "no proof"
+
+
+def test_proof_of_a_stop_that_was_reset_is_no_good_news_any_more(theme: Theme, bench: Bench) -> None:
+    stopping = bench.station.stopping
+    stopping.answered(stopping.sent(), Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    stopping.proofs = dict.fromkeys(JOINTS, Proof(38.4, "quick stop active"))
+    bench.station.take([telemetry([now := time.monotonic_ns()], {"left_knee.state": [6.0]}, now)])
+    assert row_of(bench.station, "left_knee", bench.desk)[STOP].colour == "good"
+    stopping.was_reset(held=False)
+    past = row_of(bench.station, "left_knee", bench.desk)[STOP]
+    assert (past.text, past.colour) == ("38 ms", "dim")
+    assert past.tip.endswith("which was reset since")
 
 
 def test_enabled_is_no_good_state_after_a_stop_that_is_sent_or_not_confirmed(

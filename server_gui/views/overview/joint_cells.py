@@ -190,8 +190,10 @@ def _stop(station: Station, joint: str) -> Cell:
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
             return Cell(ENABLED_AGAIN, "dim", None, f"{proof.text}; enabled again since")
-        colour = "dim" if proof.was_so else "good"
-        return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
+        is_past = stopping.state is StopState.IDLE  # it was reset since
+        colour = "dim" if proof.was_so or is_past else "good"
+        tip = f"{proof.text}, which was reset since" if is_past else proof.text
+        return Cell(proof.when, colour if station.is_live else "old", None, tip)
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window opened")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")
