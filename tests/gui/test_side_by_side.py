@@ -175,7 +175,7 @@ def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
     assert moved is not None
     shown.draw()
     assert player.beside_bar.cadence.text().startswith("gait cycles of both legs: ")
-    assert player.beside_bar.cadence.text().endswith(f": {moved.word}"), "and nothing is said of too few"
+    assert "too few cycles of one activity" in player.beside_bar.cadence.text(), "of so short a walk"
     first = next(one for one in archive.compared.pair or () if one.session != session.session)
     torque = Measured("left_knee.torque_rms", "torque RMS", "N·m", Word.CHANGED, 10, 12, 20.0, 30.0, 10.0)
     archive.compared.moved = replace(moved, metrics=(torque,))
@@ -184,6 +184,12 @@ def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
     assert remarks.of("left_knee.torque")[0] == "per gait cycle: torque RMS 20 → 30 N·m, differs"
     assert turned.of("left_knee.torque")[0] == "per gait cycle: torque RMS 30 → 20 N·m, differs"
     assert remarks.of("left_insole.force") == (), "nothing is measured of it"
+    note = "too few cycles of one activity on both sides: 30 walk before, 32 turn after"
+    few = replace(moved, word=Word.FEW, cycles_before=30, cycles_after=32, metrics=(), notes=(note,))
+    archive.compared.moved = few
+    turned = CycleRemarks(archive.compared, session, Units())
+    assert turned.cadence[0] == f"gait cycles of both legs: 32 and 30; {note}"
+    assert turned.cadence[1].endswith("32 and 30, too few of them are alike"), "and not that 30 are too few"
 
 
 @pytest.mark.parametrize("by", [By.FIRST_STRIKE, By.LAST_STRIKE])

@@ -6,7 +6,7 @@ from typing import Final, TypeVar
 from gateway.units import Units
 from ml.store.sessions import Session
 from server_gui.core.archive.recording_comparison import RecordingComparison
-from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.comparison import FEWEST, Measured, Word
 from server_gui.core.evidence.wording import from_to
 
 OF_QUANTITIES: Final = {
@@ -50,6 +50,9 @@ class CycleRemarks:
         said = (
             () if one is None else (f"{cycles}, {text.removeprefix(BEGIN)}" for text in self._said(one)[:2])
         )
+        if self._found.word is Word.FEW and min(counts) >= 2 * FEWEST:
+            why = [f"{cycles}; {note}" for note in self._found.notes[:1]]
+            return (*said, *why, f"{cycles}, too few of them are alike", cycles, "")
         return (*said, f"{cycles}: {self._found.word}", cycles, "")
 
     def _metrics(self) -> Iterator[Measured]:
