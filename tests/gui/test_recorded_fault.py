@@ -189,10 +189,10 @@ def test_its_signal_is_shown_before_and_after_the_fault(
     quantities = {name.removeprefix("left_knee.") for name in player.signals.chosen}
     assert {"current", "torque", "position", "velocity"} <= quantities, "all of that drive"
     left, right = player.signals._window
-    at_ns, newest_ns = player.signals._jumped_ns, player.signals.scene.newest_ns
-    assert at_ns is not None
+    jump, newest_ns = player.signals._jump, player.signals.scene.newest_ns
+    assert jump is not None
     assert newest_ns is not None
-    at_s = (at_ns - newest_ns) / 1e9
+    at_s = (jump.at_ns - newest_ns) / 1e9
     assert left == pytest.approx(at_s - 5.0, abs=0.2)
     assert right == pytest.approx(at_s + 5.0, abs=0.2)
 
@@ -215,13 +215,13 @@ def test_a_replay_stands_at_the_fault_whose_signals_are_shown_and_says_its_alarm
     assert player.alarms.isVisible()
     assert "left knee" in player.alarms.headline.text()
     assert "0x2310" in player.alarms.headline.text()
-    frozen, jumped_ns = signals.scene.frozen, signals._jumped_ns
+    frozen, jump = signals.scene.frozen, signals._jump
     assert frozen is not None
-    assert jumped_ns is not None
-    assert frozen.newest_ns - jumped_ns == pytest.approx(5e9, abs=2e8), "what comes after it is kept"
-    assert signals._read_s == (jumped_ns - frozen.newest_ns) / 1e9, "values are those at it"
+    assert jump is not None
+    assert frozen.newest_ns - jump.at_ns == pytest.approx(5e9, abs=2e8), "what comes after it is kept"
+    assert signals._read_s == (jump.at_ns - frozen.newest_ns) / 1e9, "values are those at it"
     assert signals.plots[0].note == f"0:0{FAULT_S:.2f}", "as the axis below it counts"
-    assert any(flag.kind is FlagKind.FAULT for flag in signals._jumped_flags)
+    assert any(flag.kind is FlagKind.FAULT for flag in jump.flags)
 
 
 def test_clock_and_alarm_are_of_the_instant_that_a_jump_leads_to(

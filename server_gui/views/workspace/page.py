@@ -11,7 +11,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.measuring import nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import default_file
@@ -34,6 +33,7 @@ from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree
 from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
+from server_gui.views.workspace.jump import Jump, event_beside, happened, jump_to
 from server_gui.views.workspace.layout_menu import LayoutMenu
 from server_gui.views.workspace.measuring import Measuring
 from server_gui.views.workspace.note import ask_note
@@ -76,15 +76,11 @@ class Signals(QWidget):
         self.area.moved.connect(self._move)
         self.area.fitted.connect(self._follow)
         self.area.hovered.connect(self._hovered)
-        self._begun, self._pace = False, RefreshRate()
-        self._jumped_ns: int | None = None  # on the robot's clock
-        self._jumped_flags: list[Flag] = []  # what had happened in what was kept then
-        self._rest_ns: int | None = None  # how long after it is awaited, while that has not all come
-        self._shown: tuple[float, float] | None = None  # of the time, as it was shown by itself
+        self._begun, self._active, self._pace = False, 0, RefreshRate()
+        self._jump: Jump | None = None
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
-        self._active = 0
         self._hover: float | None = None
         self.setObjectName("page")
         self.channels = ChannelTree()
@@ -320,7 +316,7 @@ class Signals(QWidget):
             plot.plot.set_seconds(self._seconds)
 
     def _paused(self, on: bool) -> None:
-        self._jumped_ns, self._jumped_flags, self._is_gone, self._rest_ns = None, [], False, None
+        self._jump, self._is_gone = None, False
         self.scene.go_on()
         if on:
             self.scene.freeze()
@@ -351,9 +347,9 @@ class Signals(QWidget):
     def _read_s(self) -> float | None:
         """The time that is read, s until the newest row: of the pointer, else of what one has jumped to."""
         newest_ns = self.scene.newest_ns
-        if self._hover is not None or self._jumped_ns is None or newest_ns is None:
+        if self._hover is not None or self._jump is None or newest_ns is None:
             return self._hover
-        return (self._jumped_ns - newest_ns) / 1e9
+        return (self._jump.at_ns - newest_ns) / 1e9
 
     def _note(self) -> None:
         """Ask for a note of the instant at the active cursor, else of the newest row."""
@@ -400,54 +396,36 @@ class Signals(QWidget):
 
     def show_at(self, stamp_ns: int, around_s: float = AROUND_S) -> bool:
         """Stand still with this instant of the robot's clock in the middle; False where it is gone by now."""
-        if self._desk.selected is None:
+        station = self._desk.selected
+        if station is None:
             return False
         self.pause.setChecked(True)
-        frozen = self.scene.frozen
-        if frozen is None or not len(frozen.times):
+        jump, newest_ns = jump_to(self.scene, station, stamp_ns, around_s), self.scene.newest_ns
+        if jump is None or newest_ns is None:
             return False
-        at = (stamp_ns - frozen.newest_ns) / 1e9
-        if not frozen.times[0] - frozen.times[-1] <= at <= 0.0:
-            return False
-        wanted = next((place for place, span in enumerate(SPANS_S) if span >= around_s - at), -1)
-        self.span.setCurrentIndex(wanted % len(SPANS_S))
-        self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
-        self._jumped_ns = stamp_ns
-        self._jumped_flags = list(self._desk.selected.flags)
-        is_all = at + around_s <= 0.0 or self._desk.selected.robot.is_recording
-        self._rest_ns, self._shown = None if is_all else round(around_s * 1e9), self._window
+        needed_s = around_s + (newest_ns - stamp_ns) / 1e9
+        wanted = next((place for place, span in enumerate(SPANS_S) if span >= needed_s), len(SPANS_S) - 1)
+        self.span.setCurrentIndex(wanted)
+        self._show_jump(jump)
+        self._jump = jump
         self.read_now()
         return True
 
+    def _show_jump(self, jump: Jump) -> None:
+        self._zoomed(*jump.window(self.scene.newest_ns or 0, self._seconds))
+        jump.shown = self._window
+
     def _take_the_rest(self, station: Station) -> None:
-        """Show what comes of the seconds after the instant that was asked for, unless one looks elsewhere."""
-        newest_ns, frozen = station.rings.newest_ns, self.scene.frozen
-        if self._rest_ns is None or self._jumped_ns is None or newest_ns is None:
-            return
-        if frozen is None or frozen.source is not station.rings.source or self._window != self._shown:
-            self._rest_ns = None
-            return
-        if newest_ns == frozen.newest_ns:
-            return
-        end_s = station.rings.seconds(self._jumped_ns + self._rest_ns)
-        self.scene.freeze(end_s)
-        at, around_s = (self._jumped_ns - (self.scene.newest_ns or 0)) / 1e9, self._rest_ns / 1e9
-        self._zoomed(max(at - around_s, -self._seconds), min(at + around_s, 0.0))
-        self._shown = self._window
-        self._jumped_flags = list(dict.fromkeys([*self._jumped_flags, *station.flags]))
-        if newest_ns - self._jumped_ns >= self._rest_ns:
-            self._rest_ns = None
+        """Show what comes of the seconds after the instant that was asked for."""
+        jump = self._jump
+        if jump is not None and jump.take_more(self.scene, station, self._window):
+            self._show_jump(jump)
 
     def _turn(self, way: int) -> None:
         """Turn to the next event, or the one before: of where one has jumped to, else of the newest."""
         station = self._desk.selected
-        if station is None:
-            return
-        newest_ns = station.rings.newest_ns or 0
-        here_ns = newest_ns + 1 if self._jumped_ns is None else self._jumped_ns
-        flags = [one for one in station.flags if (one.at_ns - here_ns) * way > 0]
-        if flags:
-            one = flags[0] if way > 0 else flags[-1]
+        one = None if station is None else event_beside(self._jump, station, way)
+        if one is not None:
             found = self.show_at(one.at_ns)
             self.tell(f"{one.kind.value}: {one.text}" if found else "that is too long ago")
 
@@ -456,10 +434,7 @@ class Signals(QWidget):
         newest_ns, triggered = self.scene.newest_ns, self.scene.trigger_flag()
         if newest_ns is None:
             return
-        begin_ns = newest_ns - round(SPANS_S[-1] * 1e9)
-        noted = [one for one in self._notes.flags() if begin_ns <= one.at_ns <= newest_ns]
-        known = dict.fromkeys([*self._jumped_flags, *station.flags.between(begin_ns, newest_ns + 1)])
-        found = [*known, *noted]
+        found = happened(self._jump, station, self._notes.flags(), newest_ns)
         flag(self.scene, self.cards, [*found, *([] if triggered is None else [triggered])], newest_ns)
         for button in (self.tools.before, self.tools.next):
             button.setEnabled(bool(len(station.flags)))
@@ -514,8 +489,8 @@ class Signals(QWidget):
     def _state(self, station: Station) -> str:
         more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
-        if self._rest_ns is not None:
-            return f"Shown until {self._rest_ns / 1e9:.0f} s after it{many}"
+        if self._jump is not None and self._jump.comes:
+            return f"Shown until {self._jump.around_s:.0f} s after it{many}"
         if self.pause.isChecked() or self.scene.frozen is not None:
             goes_on = "" if station.robot.is_recording else ", data continue"
             return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}{goes_on}{many}"
