@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QPushButton
 
 from gateway.units import Units
 from server_gui.core.desk.flags import Flag, FlagKind
+from server_gui.core.workspace.trigger import Condition
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
@@ -16,7 +17,7 @@ from server_gui.views.widgets.time_axis import NOW, PAUSED
 from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
-from tests.support.desk import JOINTS, telemetry, walking
+from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
 
 @pytest.fixture
@@ -213,7 +214,7 @@ def test_the_seconds_after_an_instant_are_shown_as_they_come(signals: Signals, b
     assert newest_ns is not None
     signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
     signals.refresh()
-    assert "Shown until 5 s after it" in signals.said.text()
+    assert "the 5 s after it are added as they come" in signals.said.text()
     rows_until(bench, newest_ns + 2_000_000_000)
     signals.refresh()
     _left, right = signals.plots[0].plot.window_s
@@ -251,6 +252,83 @@ def test_who_looks_elsewhere_is_not_taken_back_to_an_instant(
         assert signals.scene.newest_ns == newest_ns
     else:
         assert signals.scene.frozen is None
+
+
+def test_what_was_shown_of_before_an_instant_stays_whatever_comes_later(
+    signals: Signals, bench: Bench
+) -> None:
+    """A link that was gone for long took the fault with it that somebody looked at."""
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.refresh()
+    rows = len(signals.scene.times(100.0))
+    late_ns = newest_ns + 120_000_000_000
+    bench.station.take([telemetry([late_ns], {"left_knee.position": [0.2]}, late_ns)])
+    signals.refresh()
+    assert len(signals.scene.times(100.0)) == rows
+    signals.read_now()
+    signals.refresh()
+    assert "Paused, data continue" in signals.said.text()
+
+
+def test_an_instant_at_the_newest_row_keeps_the_seconds_before_it(signals: Signals, bench: Bench) -> None:
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns)
+    rows_until(bench, newest_ns + 9_000_000_000)
+    signals.refresh()
+    assert signals.plots[0].plot.window_s == pytest.approx((-10.0, 0.0), abs=0.03)
+
+
+def test_cursors_stay_in_the_curves_while_more_of_them_comes(signals: Signals, bench: Bench) -> None:
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.cursors.setChecked(True)
+    at_ns = [newest_ns + at_s * 1e9 for at_s in signals._at]
+    rows_until(bench, newest_ns + 2_000_000_000)
+    signals.refresh()
+    now_ns = signals.scene.newest_ns
+    assert now_ns is not None
+    assert [now_ns + at_s * 1e9 for at_s in signals._at] == pytest.approx(at_ns, abs=1e6)
+
+
+def test_another_robot_is_shown_as_it_is_now_without_what_happened_to_the_first(
+    signals: Signals, bench: Bench
+) -> None:
+    """It showed the other's fault, and said that it was paused while its curves ran on."""
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    bench.station.flags.add(Flag(newest_ns - 10, "left knee: fault", FlagKind.FAULT))
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.refresh()
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02"), walking(300), looked()])
+    bench.desk.select(other)
+    signals.read_now()
+    signals.refresh()
+    assert not signals.pause.isChecked()
+    assert "Paused" not in signals.said.text()
+    assert not any(plot.plot._flags for plot in signals.plots)
+    assert signals._read_s is None
+
+
+def test_a_view_that_was_paused_by_hand_stays_so_whatever_its_trigger_does(
+    signals: Signals, bench: Bench
+) -> None:
+    signals.choose(["left_knee.position"])
+    signals._arm(Condition(of="left_knee.position", level=0.1))
+    signals.pause.setChecked(True)
+    kept = signals.scene.frozen
+    bench.station.take([walking(300)])
+    signals.refresh()
+    assert signals.scene.frozen is kept
+    signals._show_trigger(on=False)
+    assert signals.scene.frozen is kept
+    signals.read_now()
+    signals.refresh()
+    assert "Paused" in signals.said.text()
 
 
 def test_where_the_page_is_small_an_instant_is_shown_above_what_arranges_it(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.alarms.texts import TEXTS, UNSTOPPED, Kind
 
 ASIDE: Final = re.compile(r" \([^()]*\)$")
 GRAVER: Final = {Kind.PART_STALE: "component silent", Kind.STALLED: "computer halted"}
@@ -175,6 +175,8 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         since_s = now_s if alarm.since_s is None else alarm.since_s
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)
         return Active(alarm, since_s, at_ns)
+    if alarm.kind in _OF_STOP and alarm.since_s is not None:
+        return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s)  # as the line above it says
     if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
     return dataclasses.replace(before, alarm=alarm)
@@ -185,4 +187,5 @@ def _order(one: Active) -> tuple[bool, int, float]:
 
 
 _RANK = {kind: place for place, kind in enumerate(Kind)}
+_OF_STOP = UNSTOPPED | {Kind.STOPPED, Kind.RESET}
 _NOT_ITS_STATE = frozenset({Kind.RESET})

@@ -6,54 +6,69 @@ A trunk that leans as nobody does who walks, sits or stands up; a joint beyond t
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.wire.robot import GuardRuleInfo
+from gateway.units import with_minus
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.follow.position_ends import position_ends
 from server_gui.core.follow.robot import Robot
 
 LEANS: Final = math.radians(60.0)  # who stands up from a chair leans by some 45°
 LEANING: Final = {"tilt_forward": ("forward", "backward"), "tilt_side": ("to a side", "to a side")}
 HOT: Final = 85.0  # °C: few drives are rated for more, and their electronics age fast
 SLACK: Final = math.radians(2.0)  # by which a joint may overshoot an end
-ENDS: Final = "0x607d"
 HELD_S: Final = 5.0  # what swings about its limit is one alarm, not one a stride
 
 
 @dataclass(frozen=True, slots=True)
 class FoundBeyond:
-    """One value that is, or was just now, beyond its limit."""
+    """One value that is, or was just now, beyond its limit; `is_now` is false while it is not known."""
 
     kind: Kind
     component: str
     quantity: str
     what: str
+    is_now: bool = True
+
+
+Key = tuple[Kind, str]
+Seen = tuple[FoundBeyond, float | None]  # and since when (s) its value is within again
 
 
 class Beyond:
-    """Finds them in a robot's newest values; one is over once it was not seen for `HELD_S`."""
+    """Finds them in a robot's newest values; one is over once its value was known and within for `HELD_S`."""
 
     def __init__(self) -> None:
-        self._seen: dict[tuple[Kind, str], tuple[float, FoundBeyond]] = {}
-        self._told: frozenset[tuple[Kind, str]] = frozenset()
+        self._seen: dict[Key, Seen] = {}
 
     def look(self, robot: Robot) -> tuple[FoundBeyond, ...]:
-        """Return what is beyond its limit now; what was last known so stays while nothing comes."""
-        now_s = robot.now_s()
-        if robot.is_recording:
-            self._seen.clear()  # its instant goes to and fro
-        elif not robot.is_stale():
-            self._seen = {key: one for key, one in self._seen.items() if 0 <= now_s - one[0] < HELD_S}
-        if not robot.is_stale():
-            self._seen |= {(one.kind, one.component): (now_s, one) for one in _found(robot)}
-        return tuple(one for _, one in self._seen.values() if one.component in robot.parts)
+        """Return what is beyond its limit now; what was last known so stays while nothing is known."""
+        if robot.is_stale():
+            return () if robot.is_recording else self._of(robot)
+        found: dict[Key, Seen] = {(one.kind, one.component): (one, None) for one in _found(robot)}
+        if not robot.is_recording:  # whose instant goes to and fro
+            now_s = robot.now_s()
+            kept = {key: _fading(robot, now_s, *seen) for key, seen in self._seen.items()}
+            found = {key: seen for key, seen in kept.items() if seen is not None} | found
+        self._seen = found
+        return self._of(robot)
 
-    def news(self, robot: Robot) -> list[FoundBeyond]:
-        """Return what was not so when this was asked last."""
-        found = {(one.kind, one.component): one for one in self.look(robot)}
-        told, self._told = self._told, frozenset(found)
-        return [one for key, one in found.items() if key not in told]
+    def _of(self, robot: Robot) -> tuple[FoundBeyond, ...]:
+        return tuple(one for one, _ in self._seen.values() if one.component in robot.parts)
+
+
+def _fading(robot: Robot, now_s: float, one: FoundBeyond, within_s: float | None) -> Seen | None:
+    """Return one that is not seen now, and since when; None once it is over."""
+    channel = f"{one.component}.{one.quantity}"
+    described = () if robot.description is None else robot.description.channels
+    if not any(info.name == channel for info in described):
+        return None
+    value = robot.values.get(channel)
+    if value is None or not math.isfinite(value):
+        return replace(one, is_now=False), None
+    began_s = now_s if within_s is None or now_s < within_s else within_s
+    return None if now_s - began_s >= HELD_S else (replace(one, is_now=True), began_s)
 
 
 def is_hot(temperature: float | None) -> bool:
@@ -72,7 +87,7 @@ def _found(robot: Robot) -> Iterator[FoundBeyond]:
 def _leaning(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     for quantity, (forward, backward) in LEANING.items():
         tilt = _value(robot, name, quantity)
-        if tilt is not None and abs(tilt) > LEANS:
+        if tilt is not None and abs(tilt) > LEANS and not _is_watched(robot, name, quantity, tilt):
             way = forward if tilt > 0 else backward
             what = f"leans {abs(math.degrees(tilt)):.0f}° {way}, further than who walks or stands up"
             yield FoundBeyond(Kind.FALLEN, name, quantity, what)
@@ -80,51 +95,36 @@ def _leaning(robot: Robot, name: str) -> Iterator[FoundBeyond]:
 
 
 def _beyond_an_end(robot: Robot, name: str) -> Iterator[FoundBeyond]:
-    position, ends = _value(robot, name, "position"), _ends(robot, name)
+    position, ends = _value(robot, name, "position"), position_ends(robot, name, robot.parameters)
     if position is None or ends is None or ends[0] - SLACK <= position <= ends[1] + SLACK:
         return
-    low, high = (f"{math.degrees(end):.0f}".replace("-", "−") for end in ends)
-    at = f"{math.degrees(position):.0f}".replace("-", "−")
-    yield FoundBeyond(
-        Kind.BEYOND, name, "position", f"it is at {at}°, its drive's range is {low}° to {high}°"
-    )
+    if _is_watched(robot, name, "position", position - sum(ends) / 2):
+        return
+    at, low, high = (with_minus(f"{math.degrees(angle):.0f}") for angle in (position, *ends))
+    what = f"it is at {at}°, its drive's range is {low}° to {high}°"
+    yield FoundBeyond(Kind.BEYOND, name, "position", what)
 
 
 def _hot(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     temperature = _value(robot, name, "temperature")
     if temperature is not None and is_hot(temperature):
+        if _is_watched(robot, name, "temperature", temperature):
+            return
         yield FoundBeyond(Kind.HOT, name, "temperature", f"{temperature:.1f} °C, hot from {HOT:.0f} °C on")
 
 
 def _value(robot: Robot, name: str, quantity: str) -> float | None:
-    """Return a value that is known and that no rule of a guard judges."""
+    """Return a value that is known."""
     value = robot.values.get(f"{name}.{quantity}")
-    is_known = value is not None and math.isfinite(value)
-    return value if is_known and not any(_watches(rule, name, quantity) for rule in _rules(robot)) else None
+    return value if value is not None and math.isfinite(value) else None
 
 
-def _rules(robot: Robot) -> list[GuardRuleInfo]:
+def _is_watched(robot: Robot, name: str, quantity: str, way: float) -> bool:
+    """Return whether a rule of a guard that runs has a limit on this side (up: `way` above 0)."""
     guard = None if robot.description is None else robot.description.guard
-    return [] if guard is None or not guard.configured or guard.problem is not None else guard.rules
-
-
-def _watches(rule: GuardRuleInfo, name: str, quantity: str) -> bool:
-    has_limit = rule.low is not None or rule.high is not None
-    return has_limit and name in rule.on and quantity in rule.quantities
-
-
-def _ends(robot: Robot, name: str) -> tuple[float, float] | None:
-    """Return the least and the greatest angle that the drive holds; None where these are not both known.
-
-    Equal ends, or 0 for both, are what a drive holds that has none.
-    """
-    known = () if robot.description is None else robot.description.parameters
-    held = [
-        value.value
-        for info in known
-        if info.component == name and info.unit == "rad" and info.object.lower().startswith(ENDS)
-        if (value := robot.parameters.get(info.name)) is not None and value.value is not None
-    ]
-    if len(held) != 2 or held[0] == held[1]:
-        return None
-    return float(min(held)), float(max(held))
+    if guard is None or not guard.configured or guard.problem is not None:
+        return False
+    return any(
+        name in rule.on and quantity in rule.quantities and (rule.high if way > 0 else rule.low) is not None
+        for rule in guard.rules
+    )

@@ -37,8 +37,8 @@ def drives_did(robot: Robot) -> str:
     if not is_live(robot):
         return "what its drives do now is not known"
     enabled = [joint for joint, word in words.items() if word == ENABLED]
-    if None in words.values():
-        return f"the state of {listed([joint for joint, word in words.items() if word is None])} is not known"
+    if unknown := unknown_joints(robot):
+        return f"the state of {listed(unknown)} is not known"
     if enabled:
         return f"{len(enabled)} of {len(words)} drives are enabled still"
     states = dict.fromkeys(str(word) for word in words.values())
@@ -60,6 +60,12 @@ def device_of(robot: Robot, name: str) -> Mapping[str, Any]:
 def state_words(robot: Robot) -> dict[str, str | None]:
     """Return the state of each joint's drive; None where it is not known."""
     return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
+
+
+def unknown_joints(robot: Robot) -> list[str]:
+    """Return the joints of whose drive nobody knows whether it is enabled."""
+    words = state_words(robot)
+    return [joint for joint, word in words.items() if word != ENABLED and not is_off(word)]
 
 
 def is_live(robot: Robot) -> bool:

@@ -16,6 +16,7 @@ from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.drive_states import (
     device_of,
     drives_did,
+    is_live,
     listed,
     state_words,
 )
@@ -35,6 +36,7 @@ from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
+DRIVES_NOT_KNOWN: Final = "it has told of no drive"
 EVERY_OFF: Final = "every drive is off"
 OFF: Final = frozenset({"switch on disabled"})
 # Why a robot does not drive its wearer.
@@ -131,7 +133,9 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
-        what = EVERY_OFF if set(state_words(robot).values()) <= OFF else drives_did(robot) or EVERY_OFF
+        words = set(state_words(robot).values())
+        is_every = is_live(robot) and words and words <= OFF
+        what = EVERY_OFF if is_every else drives_did(robot) or DRIVES_NOT_KNOWN
         yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
 
 
@@ -385,7 +389,7 @@ def _of_beyond(facts: Facts) -> Iterator[Alarm]:
             _did(robot, facts.stopping),
             check_of(one.kind),
             channel=_channel(robot, one.component, None, (one.quantity,)),
-            is_now=not robot.is_stale(),
+            is_now=one.is_now and not robot.is_stale(),
         )
 
 

@@ -50,6 +50,7 @@ class Kind(Enum):
 
 
 LEFT: Final = frozenset({Kind.LEFT_UNSTOPPED, Kind.LEFT_RUNNING})
+OF_VALUES: Final = frozenset({Kind.FALLEN, Kind.BEYOND, Kind.HOT})
 UNSTOPPED: Final = frozenset({Kind.STILL_MOVING, Kind.ENABLED_AGAIN, Kind.NOT_HELD, Kind.NOT_STOPPED})
 
 

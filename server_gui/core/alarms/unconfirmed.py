@@ -11,6 +11,7 @@ from server_gui.core.alarms.drive_states import (
     listed,
     moving_joints,
     state_words,
+    unknown_joints,
 )
 from server_gui.core.alarms.marks import ASKED, ENABLED, STATES, STILL_ENABLED, Mark
 from server_gui.core.alarms.texts import Kind
@@ -120,8 +121,7 @@ def remedy(robot: Robot, stopping: StopProgress) -> tuple[str, ...]:
         return (USE_HARDWARE,)
     if silent_controllers(robot, stopping):
         return KEEP_AT_HAND, f"check {', '.join(_spoken_node(robot, name) for name in stopping.silent)}"
-    is_off = is_live(robot) and None not in state_words(robot).values() and not moving_joints(robot)
-    if is_off:
+    if is_live(robot) and not unknown_joints(robot) and not moving_joints(robot):
         return ("STOP again to be sure",)
     return (STOP_AGAIN, f"or {USE_HARDWARE}") if is_live(robot) else (USE_HARDWARE,)
 

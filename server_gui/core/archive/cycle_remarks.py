@@ -51,8 +51,8 @@ class CycleRemarks:
             () if one is None else (f"{cycles}, {text.removeprefix(BEGIN)}" for text in self._said(one)[:2])
         )
         if self._found.word is Word.FEW and min(counts) >= 2 * FEWEST:
-            why = [f"{cycles}; {note}" for note in self._found.notes[:1]]
-            return (*said, *why, f"{cycles}, too few of them are alike", cycles, "")
+            notes = [f"{cycles}; {note}" for note in self._found.notes[:1]]
+            return (*said, *notes, f"{cycles}, too few of them are alike", cycles, "")
         return (*said, f"{cycles}: {self._found.word}", cycles, "")
 
     def _metrics(self) -> Iterator[Measured]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.drive_states import listed, state_words
+from server_gui.core.alarms.drive_states import listed, unknown_joints
 from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.alarms.unconfirmed import unstopped
@@ -36,7 +36,7 @@ class Left:
 def left_alarm(station: Station) -> Alarm | None:
     """Return the alarm of one that is removed now; None where every drive is known to be off."""
     robot, stopping = station.robot, station.stopping
-    kind, unknown = Kind.LEFT_RUNNING, [joint for joint, word in state_words(robot).items() if word is None]
+    kind, unknown = Kind.LEFT_RUNNING, unknown_joints(robot)
     if unstopped(robot, stopping) is not None or stopping.state is StopState.SENT:
         kind, how = Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"
     elif not station.is_live:

@@ -28,6 +28,7 @@ from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
+from server_gui.core.desk.beyond_news import BeyondNews
 from server_gui.core.desk.flag_watch import FlagWatch, of_stop
 from server_gui.core.desk.flags import Flag, FlagKind, Flags
 from server_gui.core.desk.resetting import after_reset, without_answer
@@ -99,8 +100,7 @@ class Station:
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.experiment: Run | None = None  # an A/B trial or a sweep, the newest
-        self.judged = EditList()
-        self.stopping = StopProgress()
+        self.judged, self.stopping = EditList(), StopProgress()
         self.control = LeaseState()
         self.edits, self.writing = Edits(), WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
@@ -115,8 +115,8 @@ class Station:
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
         self._happened = FlagWatch()
-        self._stalls = Stalls()
-        self._beyond = Beyond()
+        self._stalls, self._beyond = Stalls(), Beyond()
+        self._beyond_news = BeyondNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
@@ -183,8 +183,8 @@ class Station:
             return
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         is_busy, entries = self.is_overloaded(), self.audit.entries
-        beyond = self._beyond.look(self.robot)
-        facts = Facts(self.robot, self.stopping, self.address, entries, stalls, danger, is_busy, beyond)
+        known = (self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
+        facts = Facts(*known, self._beyond.look(self.robot))
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(
@@ -241,6 +241,7 @@ class Station:
                     self._others.take(event.journal.entries, time.monotonic_ns())
                     self.stopping.read(event.journal.entries, self.robot.boot_id)
                 case Described():
+                    self.stopping.calendar_ns = event.calendar_ns
                     self._described(event.description, before)
                 case Costs():
                     self.cost = event.cost
@@ -257,8 +258,7 @@ class Station:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self._look_for_alarms()  # now, so that it is known since when
-            for one in self._beyond.news(self.robot):
-                self.tell(NewsKind.WARNING, f"{one.component}: {one.what}", one.component)
+            self._beyond_news.look(self._alarms.active)
             self.reverted.look_if_over(now_ns)
             self._others.own(*(() if self.experiment is None else self.experiment.writes))
             self._others.look(now_ns)
@@ -375,7 +375,8 @@ class Station:
         number = self.stopping.number
 
         def done(reset: Reset) -> None:
-            if number != self.stopping.number:  # the journal tells which of them was last
+            is_asked = self.stopping.state is StopState.SENT  # what is not answered is not reset
+            if is_asked or number != self.stopping.number:  # the journal tells which of them was last
                 self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
                 return
             self.stopping.was_reset(reset.held)

@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Final, Protocol
 
 from gateway.amounts import counted
-from server_gui.core.alarms.drive_states import is_live, listed, state_words
+from server_gui.core.alarms.drive_states import is_live, listed, unknown_joints
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.alarms.unconfirmed import (
@@ -131,11 +131,10 @@ def _confirmed(one: Stopped) -> Standing:
         return Standing(one.title, How.OLD, brief, f"{brief}, what its drives do now is not known")
     if not one.robot.is_newer_than(one.stopping.answered_ns):
         return Standing(one.title, How.STOPPED)  # the drives' own answer is the newest that is known
-    words = state_words(one.robot)
     if again := enabled_again(one.robot, one.stopping):
         to_do = remedy(one.robot, one.stopping)
         return _not_stopped(one, TEXTS[Kind.ENABLED_AGAIN].mark.word, listed(again), to_do)
-    if unknown := [joint for joint, word in words.items() if word is None]:
+    if unknown := unknown_joints(one.robot):
         brief = f"{AS_FAR}: state not known"
         return Standing(one.title, How.OLD, brief, f"{brief} of {listed(unknown)}")
     return Standing(one.title, How.STOPPED)

@@ -11,6 +11,7 @@ from server_gui.core.follow.robot import Robot
 
 Entry = dict[str, Any]
 ANSWERED_NS: Final = 2_000_000_000  # by then a write of this window has been answered
+AT_ONCE: Final = 64  # writes, of which at most one is under way
 LATE_S: Final = 10.0  # told later than that, it is said how long ago it was
 DONE: Final = frozenset({"write done", "trial begun"})
 
@@ -32,6 +33,11 @@ class WritesOfOthers:
     def own(self, *writes: int) -> None:
         """Note the numbers of writes of this window, by the robot's answers."""
         self._own.update(writes)
+
+    def _forget(self, write: int) -> None:
+        """Forget writes of long ago that have come to nothing."""
+        for old in [one for one in self._asked if one < write - AT_ONCE]:
+            del self._asked[old]
 
     def look(self, now_ns: int) -> None:
         """Tell of those that nobody here has turned out to have asked for."""
@@ -58,6 +64,7 @@ class WritesOfOthers:
             write = entry.get("write")
             if not isinstance(write, int) or number <= read:
                 continue
+            self._forget(write)
             if entry.get("what") == "write":
                 self._asked[write] = entry
             elif entry.get("what") in DONE:

@@ -229,6 +229,8 @@ class Robot:
         if self.description is not None and self.description.boot_id != event.description.boot_id:
             self._missing = MissingPdos()  # what was before another start of the robot lasts no longer
         self.description, self.hello = event.description, event.hello
+        known = {channel.name for channel in event.description.channels}
+        self.values = {name: value for name, value in self.values.items() if name in known}
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
             part.name: FollowedComponent(part.name, part.kind, part.state, None, part.problem)

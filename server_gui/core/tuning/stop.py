@@ -95,6 +95,7 @@ class StopProgress:
     at_ns: int | None = None
     since_s: float | None = None  # UTC: of this state, as far as is known
     answered_ms: float | None = None
+    calendar_ns: int = 0  # the robot's minus ours
     number: int = 0
     drives: int = 0  # that have confirmed it
     silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
@@ -199,6 +200,8 @@ class StopProgress:
         `is_anew`: its computer has started again since.
         """
         self._hears(held)
+        if held and not self.held and self.state is StopState.IDLE:
+            self.since_s, self.was_ended = None, False  # the journal, or our own STOP, tells since when
         self.held, self.reason = held, (reason or "") if held else ""
         if not held and self.state is StopState.CONFIRMED and (self._is_written or is_anew):
             self.was_reset(held=False)
@@ -261,7 +264,7 @@ class StopProgress:
             self._holds(entry)
         elif _is_reset(entry):
             if self._is_ended_by_reset and not is_open:
-                self.was_reset(held=False, at_s=_utc_s(entry))
+                self.was_reset(held=False, at_s=self._utc_s(entry))
             elif self.state is StopState.NOT_CONFIRMED:
                 self.held, self.reason = False, ""
 
@@ -392,10 +395,16 @@ class StopProgress:
     def _holds(self, entry: Mapping[str, Any]) -> None:
         if not self.held or not self.reason:
             self.reason = _said(entry)
-        if not self.held:
-            self.since_s = _utc_s(entry)
+        if not self.held or self.since_s is None:
+            self.since_s = self._utc_s(entry)
         self._hears(True)
         self.held, self.was_ended = True, False
+
+    def _utc_s(self, entry: Mapping[str, Any]) -> float:
+        """Return when it was written, on our calendar and never later than now; now where it does not say."""
+        utc_ns = entry.get("utc_ns")
+        now_s = time.time()
+        return min(now_s, (utc_ns - self.calendar_ns) / 1e9) if isinstance(utc_ns, int) else now_s
 
     def _hears(self, held: bool) -> None:
         """Note since when the robot's word is known by which a stop is held; before it is `held`."""
@@ -416,12 +425,6 @@ def _said(entry: Mapping[str, Any]) -> str:
 def _is_reset(entry: Mapping[str, Any]) -> bool:
     """Return whether a stop ended with it."""
     return entry.get("what") == "reset" and not entry.get("held")
-
-
-def _utc_s(entry: Mapping[str, Any]) -> float:
-    """Return when it was written; now where it does not say."""
-    utc_ns = entry.get("utc_ns")
-    return utc_ns / 1e9 if isinstance(utc_ns, int) else time.time()
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -217,14 +217,25 @@ class Scene:
         self.trigger.condition = condition or Condition()
 
     def disarm(self) -> None:
-        """Wait no more, and show what comes."""
+        """Wait no more, and show what comes, unless one stands still by oneself."""
         self.trigger.off()
-        self.frozen = None
+        if self.is_kept:
+            self.frozen = None
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether it stands still by its trigger."""
+        return self.frozen is not None and self.frozen.trigger_ns is not None
 
     def look_for_trigger(self, span_s: float) -> None:
-        """Look at what has come; stands still with what was waited for, goes on where nothing comes."""
+        """Look at what has come; stands still with what was waited for, goes on where nothing comes.
+
+        Not while one stands still by oneself.
+        """
         station, trigger = self._station, self.trigger
         if station is None or self._series is None or trigger.state is TriggerState.OFF:
+            return
+        if self.frozen is not None and not self.is_kept:
             return
         rings = station.rings
         if rings.source is not self._source:

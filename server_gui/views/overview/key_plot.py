@@ -13,6 +13,7 @@ from server_gui.core.archive.playback import PlayedRobot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import row_at
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.position_ends import position_ends
 from server_gui.views.marks import old_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
@@ -43,7 +44,7 @@ class PlotKind:
     """What is plotted: channels with the colours and words of their curves; `least` range is SI.
 
     Curves whose channel's component has a parameter of the CiA 402 object `most` may come no further from 0
-    than that; of `ends`, no further than these to either side.
+    than that; of joints, with `ends`, no further than their drives' position limits.
     """
 
     title: str
@@ -51,7 +52,7 @@ class PlotKind:
     least: float
     curves: tuple[tuple[str, str, str], ...]  # channel, colour, word
     most: str = ""
-    ends: str = ""
+    ends: bool = False
 
 
 class KeyPlot(Card):
@@ -168,7 +169,7 @@ class KeyPlot(Card):
 
     def _limits(self, station: Station) -> list[float]:
         most = self._held(station, self._kind.most)
-        held = [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+        held = [*most, *(-limit for limit in most), *self._ends(station)]
         return list(dict.fromkeys([*held, *self._guarded(station)]))
 
     def _guarded(self, station: Station) -> list[float]:
@@ -183,6 +184,13 @@ class KeyPlot(Card):
             )
         ]
         return [end for both in ends for end in both if end is not None]
+
+    def _ends(self, station: Station) -> list[float]:
+        """Return the angles to which drives let their joints go."""
+        joints = dict.fromkeys(channel.partition(".")[0] for channel in self.channels if self._kind.ends)
+        of_now = station.robot.parameters or _at_start(station)
+        both = (position_ends(station.robot, joint, of_now) for joint in joints)
+        return [end for ends in both if ends is not None for end in ends]
 
     def _held(self, station: Station, wanted: str) -> list[float]:
         """Return what drives hold in an object, where the robot's file gives it the plot's unit."""

@@ -78,7 +78,7 @@ PLOTS: Final = (
         "rad",
         0.2,
         tuple((f"{side}_knee.position", side, side) for side in SIDES),
-        ends="0x607d",
+        ends=True,
     ),
     PlotKind(
         "Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.station import Station
-from server_gui.core.workspace.scene import Scene
+from server_gui.core.workspace.scene import KEPT_S, Scene
 from server_gui.views.workspace.tools import SPANS_S
 
 Span = tuple[float, float]  # s until the newest row
@@ -39,7 +39,11 @@ class Jump:
             return False
         if newest_ns == frozen.newest_ns:
             return False
-        end_ns = self.at_ns + round(self.around_s * 1e9)
+        around_ns = round(self.around_s * 1e9)
+        end_ns, first = self.at_ns + around_ns, station.rings.times(KEPT_S)[0]
+        if first > max(station.rings.seconds(self.at_ns - around_ns), frozen.times[0]):
+            self.comes = False  # what is shown of before is no longer kept
+            return False
         scene.freeze(station.rings.seconds(end_ns))
         self.flags = list(dict.fromkeys([*self.flags, *station.flags]))
         self.comes = newest_ns < end_ns

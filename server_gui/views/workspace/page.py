@@ -19,8 +19,6 @@ from server_gui.core.workspace.layouts import Layout, Layouts
 from server_gui.core.workspace.notes import LiveNotes, Notes
 from server_gui.core.workspace.scene import Scene, layout_of
 from server_gui.core.workspace.trigger import Condition
-from server_gui.core.workspace.workspace import MOST_CURVES
-from server_gui.views.marks import old_text
 from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -40,6 +38,7 @@ from server_gui.views.workspace.note import ask_note
 from server_gui.views.workspace.plot_area import PlotArea
 from server_gui.views.workspace.readings import readings, seconds_ago
 from server_gui.views.workspace.refusal import Refusal
+from server_gui.views.workspace.state_words import state_words
 from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
 from server_gui.views.workspace.unit_plot import UnitPlot
@@ -47,7 +46,6 @@ from server_gui.views.workspace.unit_plot import UnitPlot
 Floats = npt.NDArray[np.float64]
 LIST, LOW, MARGIN = 150, 90, 8  # the channels at least: wide, high; beside everything
 NARROW: Final = 380  # wide: with less the plots stand below the channels
-GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 
 
@@ -78,6 +76,7 @@ class Signals(QWidget):
         self.area.hovered.connect(self._hovered)
         self._begun, self._active, self._pace = False, 0, RefreshRate()
         self._jump: Jump | None = None
+        self._met: Station | None = None  # the robot that is shown
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
@@ -138,19 +137,27 @@ class Signals(QWidget):
         station = self._desk.selected
         if station is None:
             return
+        self._meet(station)
         self._look_beside()
         self._look(station)
         self._take_the_rest(station)
         self.scene.look_for_trigger(self._seconds)
         draw(self.scene, self.cards, station, self._seconds, self._window)
         if self._pace.is_due(station):
-            set_text(self.said, self._state(station) + self._told)
+            said = state_words(self.scene, station, self.chosen, self._jump, is_gone=self._is_gone)
+            set_text(self.said, said + self._told)
             set_tip(self.said, self.said.text())
             self._say_more()
             self._flag(station)
             read(self.scene, self.cards, station, self._read_s)
             if self.cursors.isChecked():
                 self._measure()
+
+    def _meet(self, station: Station) -> None:
+        """Show another robot as it is: nobody has paused that one."""
+        if station is not self._met:
+            self._met = station
+            self.pause.setChecked(False)
 
     @property
     def chosen(self) -> list[str]:
@@ -161,6 +168,7 @@ class Signals(QWidget):
         """Show exactly these, channels or expressions, in this order; those of one unit share a plot."""
         self.channels.choose(names)
         if self._desk.selected is not None:
+            self._meet(self._desk.selected)
             self._arrange(self._desk.selected, names)
         self._build()
 
@@ -399,11 +407,12 @@ class Signals(QWidget):
         station = self._desk.selected
         if station is None:
             return False
+        self._meet(station)
         self.pause.setChecked(True)
         jump, newest_ns = jump_to(self.scene, station, stamp_ns, around_s), self.scene.newest_ns
         if jump is None or newest_ns is None:
             return False
-        needed_s = around_s + (newest_ns - stamp_ns) / 1e9
+        needed_s = around_s + max((newest_ns - stamp_ns) / 1e9, around_s if jump.comes else 0.0)
         wanted = next((place for place, span in enumerate(SPANS_S) if span >= needed_s), len(SPANS_S) - 1)
         self.span.setCurrentIndex(wanted)
         self._show_jump(jump)
@@ -417,8 +426,11 @@ class Signals(QWidget):
 
     def _take_the_rest(self, station: Station) -> None:
         """Show what comes of the seconds after the instant that was asked for."""
-        jump = self._jump
+        jump, before_ns = self._jump, self.scene.newest_ns or 0
         if jump is not None and jump.take_more(self.scene, station, self._window):
+            moved_s = ((self.scene.newest_ns or 0) - before_ns) / 1e9
+            self._at = [at_s - moved_s for at_s in self._at]  # cursors stay where they are in the curves
+            self._mark()
             self._show_jump(jump)
 
     def _turn(self, way: int) -> None:
@@ -485,16 +497,3 @@ class Signals(QWidget):
     def export(self, save: Callable[[Path], None], path: Path) -> None:
         """Save what is on screen, and say what came of it."""
         self.tell(save_whole(save, path))
-
-    def _state(self, station: Station) -> str:
-        more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
-        many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
-        if self._jump is not None and self._jump.comes:
-            return f"Shown until {self._jump.around_s:.0f} s after it{many}"
-        if self.pause.isChecked() or self.scene.frozen is not None:
-            goes_on = "" if station.robot.is_recording else ", data continue"
-            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}{goes_on}{many}"
-        if self._is_gone:
-            return GONE
-        live = f"{station.robot.rate_hz():.0f} rows/s"
-        return f"{old_text(station)[0] if station.robot.is_stale() else live}{many}"

@@ -4,9 +4,11 @@ import math
 import time
 
 import pytest
+from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
+from gateway.wire.component import AngleInfo
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.alarms import beyond
@@ -18,6 +20,8 @@ from server_gui.core.follow.frame_time import one_moment
 from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking_bench
 
 LOW, HIGH = math.radians(-5.0), math.radians(120.0)
+COUNT = 0.0001  # rad
+ANGLE = AngleInfo(rad_per_count=COUNT, zero_offset=0.0)
 
 
 @pytest.fixture
@@ -37,11 +41,19 @@ def told(station: Station, kind: Kind) -> Alarm | None:
         return next((one.alarm for one in station.alarms.active if one.alarm.kind is kind), None)
 
 
-def with_ends(station: Station, low: float = LOW, high: float = HIGH) -> None:
+def with_ends(
+    station: Station,
+    low: float = LOW,
+    high: float = HIGH,
+    angle: AngleInfo | UnsetType = ANGLE,
+    scale: float = COUNT,
+    guard: GuardInfo | None = None,
+) -> None:
+    """Parameters of both ends, whose counts times `scale` are `low` and `high`."""
     infos = [
         ParameterInfo(
             name, "rad", None, None, None, live=True, states=None, component="left_knee", object=at,
-            access="rw", store=True,
+            access="rw", store=True, scale=scale,
         )
         for name, at in (("left_knee.low", "0x607D:1"), ("left_knee.high", "0x607D:2"))
     ]  # fmt: skip
@@ -50,7 +62,12 @@ def with_ends(station: Station, low: float = LOW, high: float = HIGH) -> None:
         for name, value in (("left_knee.low", low), ("left_knee.high", high))
     }
     whole = looked()
-    station.take([Described(replace(described().description, parameters=infos))])
+    described_as = described().description
+    components = [
+        replace(part, angle=angle) if part.name == "left_knee" else part for part in described_as.components
+    ]
+    guard = guard or described_as.guard
+    station.take([Described(replace(described_as, parameters=infos, components=components, guard=guard))])
     station.take([Looked(whole.quality, ParameterValues(held), whole.at_ns)])
 
 
@@ -155,3 +172,68 @@ def test_a_rule_of_a_guard_that_runs_decides_instead(bench: Bench) -> None:
     with one_moment():
         hot = {one.alarm.subject for one in bench.station.alarms.active if one.alarm.kind is Kind.HOT}
     assert "left_knee" in hot
+
+
+@pytest.mark.parametrize(
+    ("angle", "scale", "inside", "outside"),
+    [
+        (AngleInfo(COUNT, math.radians(90.0)), COUNT, 150.0, 30.0),  # the drive's 0 is at 90°
+        (AngleInfo(-COUNT, 0.0), COUNT, -60.0, 30.0),  # counts fall when it bends
+        (AngleInfo(COUNT, 0.0), -COUNT, 60.0, -60.0),  # its parameter counts the other way
+        (AngleInfo(COUNT, 0.0), 1.0, 60.0, -60.0),  # it is in counts
+    ],
+)
+def test_ends_are_angles_of_the_joint_as_its_position_is(
+    bench: Bench, angle: AngleInfo, scale: float, inside: float, outside: float
+) -> None:
+    """A joint far beyond its end was green, and one in its middle red."""
+    with_ends(bench.station, LOW / COUNT * scale, HIGH / COUNT * scale, angle, scale)
+    now(bench, left_knee__position=math.radians(inside))
+    assert told(bench.station, Kind.BEYOND) is None
+    now(bench, left_knee__position=math.radians(outside))
+    assert told(bench.station, Kind.BEYOND) is not None
+
+
+def test_ends_are_not_known_where_nobody_knows_what_a_count_is(bench: Bench) -> None:
+    with_ends(bench.station, angle=UNSET)
+    now(bench, left_knee__position=2.5)
+    assert told(bench.station, Kind.BEYOND) is None
+
+
+def test_a_rule_with_a_limit_on_one_side_decides_of_that_side_alone(bench: Bench) -> None:
+    rule = GuardRuleInfo(
+        "flexion", "joint_limit", "above 120°", ["left_knee"], ["alarm"], "alarm", "watching", 0, None, 0, [],
+        quantities=["position"], high=HIGH,
+    )  # fmt: skip
+    with_ends(bench.station, guard=GuardInfo(configured=True, rules=[rule]))
+    now(bench, left_knee__position=math.radians(140.0))
+    assert told(bench.station, Kind.BEYOND) is None, "the guard tells it"
+    now(bench, left_knee__position=math.radians(-40.0))
+    assert told(bench.station, Kind.BEYOND) is not None
+
+
+def test_a_fall_does_not_end_because_its_sensor_is_lost(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now(bench, trunk__tilt_forward=1.5)
+    for later_s in (1.0, 2.0 * beyond.HELD_S, 5.0 * beyond.HELD_S):
+        at_s = time.time() + later_s
+        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        now(bench, trunk__tilt_forward=None, left_knee__position=0.1)
+        alarm = told(bench.station, Kind.FALLEN)
+        assert alarm is not None
+        assert not alarm.is_now
+    for later_s in (26.0, 26.0 + beyond.HELD_S):
+        at_s = time.time() + later_s
+        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        now(bench, trunk__tilt_forward=0.1)
+    assert told(bench.station, Kind.FALLEN) is None
+
+
+def test_a_value_whose_channel_is_gone_is_no_alarm_for_good(bench: Bench) -> None:
+    now(bench, left_knee__temperature=95.0)
+    description = described().description
+    channels = [one for one in description.channels if one.name != "left_knee.temperature"]
+    bench.station.take([Described(replace(description, channels=channels))])
+    now(bench, left_knee__position=0.1)
+    assert told(bench.station, Kind.HOT) is None

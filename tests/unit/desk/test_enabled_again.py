@@ -182,3 +182,36 @@ def test_no_time_is_shorter_than_a_millisecond() -> None:
     stopping.proofs.clear()
     stopping.answered_ms = None
     assert stopping.slowest_ms == 1.0
+
+
+def test_an_alarm_of_a_stop_is_since_when_the_line_above_it_says(bench: Bench) -> None:
+    """Who stopped it again after somebody had enabled it saw two times, hours apart."""
+    ours(bench)
+    bench.station.stopping.since_s = time.time() - 10_000.0
+    bench.look_again([states(6.0)])
+    bench.station.stop("again")
+    bench.station.stopping._off = set()  # somebody had enabled all of them
+    bench.first.answer(ALL)
+    (one,) = [one for one in bench.station.alarms.active if one.alarm.kind is Kind.STOPPED]
+    assert one.since_s == bench.station.stopping.since_s
+    assert one.since_s > time.time() - 1_000.0
+
+
+def test_after_a_reset_nobody_says_of_a_robot_out_of_reach_that_its_drives_are_off(bench: Bench) -> None:
+    ours(bench)
+    bench.look_again([states(6.0)])
+    bench.station.reset()
+    bench.first.answer(OFF)
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    (one,) = [one.alarm for one in bench.station.alarms.active if one.alarm.kind is Kind.RESET]
+    assert one.what == "what its drives do now is not known"
+
+
+def test_a_reset_of_another_stop_does_not_end_ours_that_nobody_has_answered(bench: Bench) -> None:
+    """The robot was green while its STOP was on its way."""
+    others(bench)
+    bench.station.stop("test")
+    bench.station.reset()
+    bench.first.answer(OFF)
+    assert bench.station.stopping.state is StopState.SENT
+    assert bench.station.mark.colour != "good"

@@ -44,6 +44,10 @@ def unknown(bench: Bench) -> None:
     seen(bench.station, [None] + [OFF] * 5)
 
 
+def nameless(bench: Bench) -> None:
+    seen(bench.station, [9.0] + [OFF] * 5)  # a state that the robot has no word for
+
+
 def gone(bench: Bench) -> None:
     off(bench)
     bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
@@ -71,6 +75,7 @@ def stopped(bench: Bench) -> None:
         (stopped, None, ""),
         (enabled, Kind.LEFT_RUNNING, "while its drives were enabled"),
         (unknown, Kind.LEFT_RUNNING, "while the state of left hip was not known"),
+        (nameless, Kind.LEFT_RUNNING, "while the state of left hip was not known"),
         (gone, Kind.LEFT_RUNNING, "while it was not known whether its drives are enabled"),
         (asked, Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"),
         (failed, Kind.LEFT_UNSTOPPED, "while it was not known to have stopped"),

@@ -1,5 +1,7 @@
 """A STOP as the window knows it: by its answer, the drives' rows, the link and the robot's journal."""
 
+import time
+
 import msgspec
 import pytest
 
@@ -299,3 +301,26 @@ def test_a_stop_that_fails_while_another_is_held_is_not_confirmed_since_now() ->
     assert stopping.state is StopState.NOT_CONFIRMED
     assert stopping.since_s is not None
     assert stopping.since_s > first_s
+
+
+def test_a_stop_that_is_found_held_is_not_held_since_the_reset_before_it() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping.read([written(5, "stop")])
+    stopping.was_reset(held=False, at_s=100.0)
+    stopping.described(held=True, reason="door")
+    assert (stopping.held, stopping.was_ended, stopping.since_s) == (True, False, None)
+    stopping.read([written(7, "stop", utc_ns=200_000_000_000)])
+    assert stopping.since_s == 200.0
+
+
+def test_the_journals_time_is_told_by_our_calendar_and_never_later_than_now() -> None:
+    """A robot whose clock was an hour ahead had stopped in an hour."""
+    stopping, now_ns = StopProgress(), time.time_ns()
+    stopping.calendar_ns = 3600 * 10**9
+    stopping.read([written(7, "stop", utc_ns=now_ns + 3590 * 10**9)])
+    assert stopping.since_s == pytest.approx(now_ns / 1e9 - 10.0)
+    other = StopProgress()
+    other.read([written(7, "stop", utc_ns=now_ns + 3600 * 10**9)])
+    assert other.since_s is not None
+    assert other.since_s <= time.time()

@@ -1,0 +1,29 @@
+"""In words, which time signals show: live, paused, or what a trigger has kept; and what is not drawn."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from server_gui.core.desk.station import Station
+from server_gui.core.workspace.scene import Scene
+from server_gui.core.workspace.workspace import MOST_CURVES
+from server_gui.views.marks import old_text
+from server_gui.views.workspace.jump import Jump
+
+GONE: Final = "Live: that instant is gone from here, see Recordings"
+
+
+def state_words(
+    scene: Scene, station: Station, chosen: Sequence[str], jump: Jump | None, *, is_gone: bool
+) -> str:
+    """Return them; `is_gone`: the instant that was asked for last is."""
+    more = len([name for name in chosen if name not in scene.workspace.curves])
+    many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
+    if jump is not None and jump.comes:
+        return f"Paused; the {jump.around_s:.0f} s after it are added as they come{many}"
+    if scene.frozen is not None:
+        goes_on = "" if station.robot.is_recording else ", data continue"
+        return f"{'Kept by the trigger' if scene.is_kept else 'Paused'}{goes_on}{many}"
+    if is_gone:
+        return GONE
+    live = f"{station.robot.rate_hz():.0f} rows/s"
+    return f"{old_text(station)[0] if station.robot.is_stale() else live}{many}"
