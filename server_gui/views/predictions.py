@@ -125,8 +125,10 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
         is_doubtful=is_doubtful,
         is_sure=is_sure,
     )
-    is_unchecked = worth.worth is Worth.UNCHECKED and prediction.task == ACTIVITY
-    return _modest(row, word) if is_unchecked and not isinstance(shown, Recalled) else row
+    is_unchecked = worth.worth is Worth.UNCHECKED and not isinstance(shown, Recalled)
+    if is_unchecked and prediction.task == FALLING and not falls:
+        row = replace(row, brief=f"{word}, not checked")
+    return _modest(row, word) if is_unchecked and prediction.task == ACTIVITY else row
 
 
 def _modest(row: PredictionRow, word: str) -> PredictionRow:

@@ -101,7 +101,8 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
 
 
 @pytest.mark.parametrize(
-    ("pending", "said"), [(0, "nothing waits · "), (1 << 20, "1.0 MiB not uploaded yet: not a batch yet · ")]
+    ("pending", "said"),
+    [(0, "nothing waits · "), (1 << 20, "1.0 MiB not uploaded yet: less than a batch · ")],
 )
 def test_rows_that_are_no_batch_yet_wait_as_well(
     shown: Shown, archive: Archive, bench: Bench, pending: int, said: str

@@ -117,7 +117,8 @@ def test_no_percentage_stands_without_how_far_to_believe_it(station: Station, la
     balance = next(line for line in lines(station) if line.text.startswith("Balance: "))
     assert balance.wordings[0].startswith(f"Balance: {label.capitalize()} 97 % · not yet checked")
     assert all("not yet checked" in said for said in balance.wordings if "%" in said)
-    assert balance.wordings[-1] == f"Balance: {label.capitalize()}"
+    least = "Balance: Steady, not checked" if label == "steady" else "Balance: Fall"
+    assert balance.wordings[-1] == least
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:

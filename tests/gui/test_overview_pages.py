@@ -140,7 +140,7 @@ def test_an_insole_in_trouble_is_named_on_the_button_of_the_wearer(
     settle(window, bench)
     assert page.sections.buttons[0].text() == "Joints"
     button = page.sections.buttons[1]
-    assert button.text() == "■ Wearer and plots: left insole"
+    assert button.text() == "✕ Wearer and plots: left insole"
     assert button.property("tone") == "bad"
 
 

@@ -194,7 +194,7 @@ def test_an_instant_that_is_gone_is_not_shown_as_another_one(signals: Signals, b
     signals.show_around(("left_knee.position",), newest_ns - 3_600_000_000_000)
     signals.refresh()
     assert not signals.pause.isChecked()
-    assert "gone from here" in signals.said.text()
+    assert "Gone from here" in signals.said.text()
     signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
     signals.refresh()
     assert "gone" not in signals.said.text()

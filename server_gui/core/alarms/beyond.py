@@ -87,7 +87,7 @@ def _found(robot: Robot) -> Iterator[FoundBeyond]:
 def _leaning(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     for quantity, (forward, backward) in LEANING.items():
         tilt = _value(robot, name, quantity)
-        if tilt is not None and abs(tilt) > LEANS and not _is_watched(robot, name, quantity, tilt):
+        if tilt is not None and abs(tilt) > LEANS and not _is_watched(robot, name, quantity, tilt, LEANS):
             way = forward if tilt > 0 else backward
             what = f"leans {abs(math.degrees(tilt)):.0f}° {way}, further than who walks or stands up"
             yield FoundBeyond(Kind.FALLEN, name, quantity, what)
@@ -98,7 +98,8 @@ def _beyond_an_end(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     position, ends = _value(robot, name, "position"), position_ends(robot, name, robot.parameters)
     if position is None or ends is None or ends[0] - SLACK <= position <= ends[1] + SLACK:
         return
-    if _is_watched(robot, name, "position", position - sum(ends) / 2):
+    way = position - sum(ends) / 2
+    if _is_watched(robot, name, "position", way, (ends[1] if way > 0 else -ends[0]) + SLACK):
         return
     at, low, high = (with_minus(f"{math.degrees(angle):.0f}") for angle in (position, *ends))
     what = f"it is at {at}°, its drive's range is {low}° to {high}°"
@@ -108,7 +109,7 @@ def _beyond_an_end(robot: Robot, name: str) -> Iterator[FoundBeyond]:
 def _hot(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     temperature = _value(robot, name, "temperature")
     if temperature is not None and is_hot(temperature):
-        if _is_watched(robot, name, "temperature", temperature):
+        if _is_watched(robot, name, "temperature", temperature, math.inf):  # who wrote it knows the drive
             return
         yield FoundBeyond(Kind.HOT, name, "temperature", f"{temperature:.1f} °C, hot from {HOT:.0f} °C on")
 
@@ -119,12 +120,18 @@ def _value(robot: Robot, name: str, quantity: str) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _is_watched(robot: Robot, name: str, quantity: str, way: float) -> bool:
-    """Return whether a rule of a guard that runs has a limit on this side (up: `way` above 0)."""
+def _is_watched(robot: Robot, name: str, quantity: str, way: float, within: float) -> bool:
+    """Return whether a guard has a limit on this side (up: `way` above 0), no further out than `within`.
+
+    One that does not run, or a rule that is blind, watches nothing.
+    """
     guard = None if robot.description is None else robot.description.guard
     if guard is None or not guard.configured or guard.problem is not None:
         return False
-    return any(
-        name in rule.on and quantity in rule.quantities and (rule.high if way > 0 else rule.low) is not None
-        for rule in guard.rules
-    )
+    for rule in guard.rules:
+        limit = rule.high if way > 0 else None if rule.low is None else -rule.low
+        is_of_it = name in rule.on and quantity in rule.quantities
+        sees = (robot.word(f"guard.{rule.name}") or rule.state) != "blind"
+        if is_of_it and sees and limit is not None and limit <= within:
+            return True
+    return False

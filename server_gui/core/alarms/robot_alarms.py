@@ -1,5 +1,6 @@
 """A robot's alarms, from what is known of it. What is not known is an alarm too."""
 
+import dataclasses
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,6 +44,8 @@ OFF: Final = frozenset({"switch on disabled"})
 HELD: Final = "a stop is held"
 STOPPING: Final = "drives stop"
 IN_FAULT: Final = "a drive is in fault"
+NO_CODE_YET: Final = "its code has not come yet"
+NO_CODE_THEN: Final = "its code is not known at this instant"
 NONE_ENABLED: Final = "no drive is enabled"
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
@@ -87,8 +90,15 @@ class Facts:
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
-    told = without_wires(_found(facts), facts.robot)
+    told = without_wires(map(_in_one_line, _found(facts)), facts.robot)
     return load_first(told, first, len(facts.robot.parts), wired=not is_simulated(facts.robot))
+
+
+def _in_one_line(alarm: Alarm) -> Alarm:
+    """Return it without lines of its own, which would look like ours: a robot may say what it likes."""
+    what, did = (" ".join(text.split()) for text in (alarm.what, alarm.did))
+    check, why, aside = (" ".join(text.split()) for text in (alarm.check, alarm.why, alarm.aside))
+    return dataclasses.replace(alarm, what=what, did=did, check=check, why=why, aside=aside)
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
@@ -230,7 +240,7 @@ def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
     told = robot.values.get(f"{part.name}.error_code")
     if told:
         return error_text(int(told)), int(told)
-    return said or "the drive does not say why", None
+    return said or (NO_CODE_THEN if robot.is_recording else NO_CODE_YET), None
 
 
 def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> Iterator[Alarm]:

@@ -1,6 +1,6 @@
 """How bad a thing is, by the one table of alarms: for an event of it, and for the bus that it is on."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.marks import NEWS, Mark
@@ -16,6 +16,13 @@ def event_mark(item: Item, alarms: Alarms | None) -> Mark:
     about = [] if alarms is None or not item.about else [*_since(alarms, item)]
     worst = min(about, key=lambda alarm: alarm.rank, default=None)
     return own if worst is None else Mark(worst.mark.shape, worst.mark.colour, own.word)
+
+
+def worst_of(subjects: Collection[str], alarms: Alarms) -> Mark:
+    """Return the mark of the worst alarm about some components; without one, that something is wrong."""
+    about = (alarm for alarm in alarms.each if alarm.subject in subjects)
+    worst = min(about, key=lambda alarm: alarm.rank, default=None)
+    return Mark("square", "bad") if worst is None else worst.mark
 
 
 def colour_of(subject: str, alarms: Alarms, otherwise: str = "bad") -> str:

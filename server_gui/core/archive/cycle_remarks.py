@@ -47,13 +47,17 @@ class CycleRemarks:
         one = next((one for one in self._metrics() if one.series == CADENCE), None)
         counts = self._turned(self._found.cycles_before, self._found.cycles_after)
         cycles = f"gait cycles of both legs: {counts[0]} and {counts[1]}"
+        brief = f"cycles {counts[0]} and {counts[1]}:"
         said = (
             () if one is None else (f"{cycles}, {text.removeprefix(BEGIN)}" for text in self._said(one)[:2])
         )
         if self._found.word is Word.FEW and min(counts) >= 2 * FEWEST:
             notes = [f"{cycles}; {note}" for note in self._found.notes[:1]]
-            return (*said, *notes, f"{cycles}, too few of them are alike", cycles, "")
-        return (*said, f"{cycles}: {self._found.word}", cycles, "")
+            return (*said, *notes, f"{cycles}, too few of them are alike", f"{brief} too few alike", "")
+        judged = f"{cycles}: {self._found.word}"
+        if self._found.word is Word.FEW:
+            return (*said, f"{judged}, it takes {FEWEST} of each leg", judged, f"{brief} too few", "")
+        return (*said, judged, cycles, "")
 
     def _metrics(self) -> Iterator[Measured]:
         found = () if self._found is None else self._found.metrics

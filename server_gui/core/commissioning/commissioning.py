@@ -153,7 +153,7 @@ class Commissioning:
     @property
     def can_stop(self) -> bool:
         """As soon as there is something to ask: also what a command that has died has left."""
-        return self.wish is not None and self.stage is not Stage.STOPPING
+        return self.wish is not None
 
     @property
     def live(self) -> tuple[ReadingMessage, ...]:

@@ -103,7 +103,9 @@ class Desk:
         """Look at it no more; another one is selected where it was."""
         if not station.robot.is_recording:
             left = left_alarm(station)
-            station.tell(NewsKind.CONTROL, "removed" if left is None else f"removed {left.what}")
+            kind = NewsKind.CONTROL if left is None else NewsKind.WARNING
+            kind = NewsKind.NOT_STOPPED if left is not None and left.kind is Kind.LEFT_UNSTOPPED else kind
+            station.tell(kind, "removed" if left is None else f"removed {left.what}")
             if left is not None:
                 self._left[left.key] = Left(left, station)
         if self._stop_all is not None:

@@ -1,5 +1,6 @@
 """What became of STOP ALL: one result of all robots, beside each robot's own, until all are reset."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -169,7 +170,9 @@ def _result(robots: Sequence[Standing], drives: str) -> StopAllResult:
     why = [f"{one.title} {one.why}" for one in doubtful]
     mark = SENT if waiting else STOPPED
     mark = Mark("square", "bad", mark.word) if by_how[How.NOT_STOPPED] else mark
-    wordings = ("; ".join((*parts, *why)), "; ".join((*parts, *brief)), "; ".join((count, *brief)))
+    said = Counter(one.brief for one in doubtful)
+    least = "; ".join((*(f"{number} {word}" for word, number in said.items()), count))  # whatever their names
+    wordings = ("; ".join((*parts, *why)), "; ".join((*parts, *brief)), "; ".join((count, *brief)), least)
     return StopAllResult(mark, tuple(dict.fromkeys(f"{mark.word}: {said}" for said in wordings)))
 
 

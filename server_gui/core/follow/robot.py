@@ -233,7 +233,7 @@ class Robot:
         self.values = {name: value for name, value in self.values.items() if name in known}
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
-            part.name: FollowedComponent(part.name, part.kind, part.state, None, part.problem)
+            part.name: FollowedComponent(part.name, part.kind, part.state, None, _in_one_line(part.problem))
             for part in event.description.components
         }
 
@@ -269,5 +269,10 @@ def _part(known: FollowedComponent, found: QualityInfo) -> FollowedComponent:
         known.kind,
         str(found.get("state", "unknown")),
         age_ms if isinstance(age_ms, int | float) else None,
-        None if problem is None else str(problem),
+        _in_one_line(problem),
     )
+
+
+def _in_one_line(problem: object) -> str | None:
+    """Return what a robot says of a part; a line of its own would look like one of ours."""
+    return None if problem is None else " ".join(str(problem).split())

@@ -71,6 +71,9 @@ class Quality(Struct, frozen=True):
     @property
     def text(self) -> str:
         """In words."""
+        if self.labelled < FEW:
+            counts = f"{self.right} right, {self.wrong} wrong, {self.unsaid} not said"
+            return f"of {self.labelled} labelled decisions {counts}"
         right, wrong, unsaid = self.shares
         return f"{right} right, {wrong} wrong, {unsaid} not said of {self.labelled} labelled"
 

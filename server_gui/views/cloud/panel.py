@@ -270,7 +270,7 @@ def _waiting(uploader: UploaderState) -> str:
     """Say what is on this computer alone: batches, and the newest rows, which are no batch yet."""
     if not uploader.backlog_bytes:
         return "nothing waits"
-    batches = counted(uploader.waiting, "batch", "batches") if uploader.waiting else "not a batch yet"
+    batches = counted(uploader.waiting, "batch", "batches") if uploader.waiting else "less than a batch"
     return f"{size(uploader.backlog_bytes)} not uploaded yet: {batches}"
 
 

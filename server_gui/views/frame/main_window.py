@@ -236,13 +236,15 @@ class MainWindow(QMainWindow):
         Another robot is named, a STOP goes on, or its wearer does something else, as the ring shows at once.
         """
         station, page = self._desk.selected, self.tabs.currentIndex()
+        commissioned = None if self._commissioning is None else self._commissioning.stage
         if station is None:
-            return self._pace.is_due((page, station))
+            return self._pace.is_due((page, station, commissioned))
         about = (
             station.is_live,
             *station.stopping.stage,
             activity(station).mark.word,
             self._desk.stopped_all,
+            commissioned,
         )
         return self._pace.is_due((page, station, *about))
 

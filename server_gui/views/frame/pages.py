@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol, TypeVar, cast
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from server_gui.core.archive.archive import Archive
@@ -58,6 +58,7 @@ class Pages(QTabWidget):
         super().__init__()
         self._desk, self._theme = desk, theme
         self.setAccessibleName("Views")
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # it would give it to its own bar, which is not shown
         step = None if archive is None else archive.playback.step
         journals = None if archive is None else archive.journals
         self._rooms: list[LazyView[QWidget]] = []

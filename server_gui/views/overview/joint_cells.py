@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.units import Unit, rounded
+from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.beyond import is_hot
 from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.robot_alarms import split_advice
 from server_gui.core.alarms.severity import colour_of
-from server_gui.core.alarms.texts import error_text
+from server_gui.core.alarms.texts import OF_VALUES, Kind, error_text
 from server_gui.core.alarms.unconfirmed import enabled_mark
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -115,13 +116,15 @@ def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     unit = unit_of(desk, "position")
     position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
     text = f"{_text(unit, 'position', position)} / {_text(unit, 'position', target)}"
+    beyond = next((one for one in _of_values(station, joint) if one.kind is Kind.BEYOND), None)
+    known = "text" if beyond is None else beyond.mark.colour
     if position is None or target is None:
-        return Cell(text, "old" if stale or position is None else "text")
+        return Cell(text, "old" if stale or position is None else known)
     off = position - target
     follows = not stale and station.robot.word(f"{joint}.state") == ENABLED
     bar = None if not follows else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
     return Cell(
-        text, "old" if stale else "text", bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"
+        text, "old" if stale else known, bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"
     )
 
 
@@ -171,7 +174,15 @@ def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
         return Cell(said, "old" if not station.is_live else colour, None, problem)
     if stale:
         return Cell(NOT_KNOWN, "old")
+    if beyond := _of_values(station, part.name):
+        return Cell(beyond[0].mark.word, beyond[0].mark.colour, None, beyond[0].what)
     return Cell("–", "dim")
+
+
+def _of_values(station: Station, joint: str) -> list[Alarm]:
+    """Return the alarms of its values, the worst first."""
+    found = [one for one in station.alarms.each if one.subject == joint and one.kind in OF_VALUES]
+    return sorted(found, key=lambda alarm: alarm.rank)
 
 
 def at_fault(station: Station, joints: list[str]) -> frozenset[int]:

@@ -92,8 +92,8 @@ class JointModel(QAbstractTableModel):
 
     def widest(self, column: int, metrics: QFontMetrics, said: Callable[[str], str] = str) -> int:
         """Return how wide a column is at least, so that nothing in it is cut, as it is `said`."""
-        texts = [said(row[column].text) for row in self._cells]
-        texts.append(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
+        texts = {said(row[column].text) for row in self._cells}
+        texts.add(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
         return max(metrics.horizontalAdvance(text) for text in texts)
 
     @property
@@ -310,7 +310,9 @@ class JointTable(QTableView):
             widths = [self._width(column) for column in range(len(COLUMNS))]
             shown = self._with_room(widths)
             of_error = room - sum(widths[known] for known in shown if known != ERROR)
-            self._bars.is_short = any(self._text_width(text) > of_error for _, text in self._model.errors)
+            self._bars.is_short = any(
+                self._text_width(text) > of_error for text in {text for _, text in self._model.errors}
+            )
             if self._bars.is_short:
                 widths[ERROR] = max(self._text_width(LEAST_ERROR), self._text_width(COLUMNS[ERROR][0]))
                 shown = self._with_room(widths)

@@ -248,6 +248,10 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
     said = dict.fromkeys((mark.word.capitalize(), SHORTER.get(mark.word, mark.word).capitalize()))
+    worst = station.mark
+    if mark.colour == "good" and worst.colour in ("warn", "bad"):  # as its card says
+        led = Mark(worst.shape, worst.colour, mark.word)
+        return led, tuple(said), (f"{count} · {worst.word}", worst.word, count)
     return mark, tuple(said), (*_warmest(station, units, count), count)
 
 

@@ -10,6 +10,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QToolBar, QVBoxLayout, QWidget
 
+from server_gui.core.alarms.severity import worst_of
 from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import Load, Sole, loads, sole
@@ -334,9 +335,8 @@ class Overview(QWidget):
             self._model.refresh()
             self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
             joints = [joint for joint, _ in self._model.errors]
-            self.sections.say(
-                {Section.JOINTS: (joints, self._table.tone), Section.WEARER: unwell_sensors(station)}
-            )
+            worst = worst_of([joint.replace(" ", "_") for joint in joints], station.alarms)
+            self.sections.say({Section.JOINTS: (joints, worst), Section.WEARER: unwell_sensors(station)})
             self._joints.set_note(*age_texts(station))
 
     # --- one time for all plots

@@ -3,7 +3,8 @@
 from typing import Final
 
 from gateway.units import Unit, rounded
-from server_gui.core.alarms.severity import colour_of
+from server_gui.core.alarms.marks import Mark
+from server_gui.core.alarms.severity import worst_of
 from server_gui.core.desk.soles import Load
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import age_text, old_text
@@ -13,13 +14,12 @@ from server_gui.views.widgets.plot import PlacedFlag
 SIDES: Final = ("left", "right")
 
 
-def unwell_sensors(station: Station) -> tuple[list[str], str]:
-    """Return what of the wearer's sensors is not well, and how bad that is."""
+def unwell_sensors(station: Station) -> tuple[list[str], Mark]:
+    """Return what of the wearer's sensors is not well, and the mark of the worst of it."""
     joints = station.robot.names("joint")
     names = [part.name for part in station.robot.not_ok() if part.name not in joints]
     shown = [name for name in names if name.endswith("_insole") or name == "trunk"]
-    colours = {colour_of(name, station.alarms) for name in shown}
-    return [name.replace("_", " ") for name in shown], "bad" if "bad" in colours else "warn"
+    return [name.replace("_", " ") for name in shown], worst_of(shown, station.alarms)
 
 
 def legs_of(station: Station) -> tuple[str, ...]:

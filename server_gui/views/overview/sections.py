@@ -7,7 +7,7 @@ from typing import Final
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QPushButton
 
-from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.marks import GLYPHS, Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_tone
 
@@ -20,7 +20,7 @@ class Section(Enum):
     PLOTS = "plots"
 
 
-Wrong = tuple[Collection[str], str]  # what is not well, and its tone
+Wrong = tuple[Collection[str], Mark]  # what is not well, and the mark of the worst of it
 TONES: Final = ("", "warn", "bad")  # the worst last
 Page = frozenset[Section]
 JOINTS, WEARER, PLOTS = (frozenset({section}) for section in Section)
@@ -95,11 +95,12 @@ class SectionBar(QFrame):
         for button, page in zip(self.buttons, self._pages, strict=False):
             behind = [wrong[one] for one in Section if one in page - everywhere and one in wrong]
             names = [name for found, _ in behind for name in found]
-            tone = max((tone for _, tone in behind), key=TONES.index, default="")
+            worst = max((mark for _, mark in behind), key=lambda mark: TONES.index(mark.colour), default=None)
+            tone = "" if worst is None else worst.colour
             text = name_of(page)
-            if names:
+            if names and worst is not None:
                 which = names[0] if len(names) == 1 else f"{len(names)} not ok"
-                text = f"{GLYPHS['square' if tone == 'bad' else 'triangle']} {text}: {which}"
+                text = f"{GLYPHS[worst.shape]} {text}: {which}"
             if button.text() != text:
                 button.setText(text)
             set_tone(button, tone if names else "")

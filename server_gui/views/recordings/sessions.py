@@ -442,9 +442,9 @@ def _here(session: Session, tape: Tape | None, *, away: bool) -> str:
 
 def _inside(tape: Tape, *, is_partial: bool, is_now: bool) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
-    head = f"{length} of {len(tape.units)} channels"
+    head = f"{length}, {len(tape.units)} channels"
     if is_partial:
-        head = f"{head} can be played"
+        head = f"{length} of it can be played, {len(tape.units)} channels"
     elif is_now:
         head = f"Its first {length} can be played by now, {len(tape.units)} channels"
     if not tape.events:

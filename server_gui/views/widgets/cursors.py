@@ -15,16 +15,16 @@ from server_gui.views.theme import Theme
 LETTERS: Final = ("A", "B")
 NEAR_PX: Final = 6  # from a cursor or a flag, to mean it
 FLAGS: Final = {
-    FlagKind.STOP: Mark("square", "bad", "stop"),
+    FlagKind.STOP: Mark("triangle", "warn", "stop"),
     FlagKind.UNPROVEN: Mark("box", "bad", "stop not confirmed"),
-    FlagKind.FAULT: Mark("triangle", "bad", "fault"),
+    FlagKind.FAULT: Mark("square", "bad", "fault"),
     FlagKind.WRITE: Mark("disc", "accent", "write"),
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
-    FlagKind.DANGER: Mark("triangle", "warn", "danger"),
+    FlagKind.DANGER: Mark("diamond", "warn", "danger"),
     FlagKind.RULE: Mark("half", "warn", "rule"),
     FlagKind.BUS: Mark("disc", "warn", "bus"),
     FlagKind.GAP: Mark("cross", "warn", "gap"),
-    FlagKind.CHANGE: Mark("square", "dim", "change"),
+    FlagKind.CHANGE: Mark("box", "dim", "change"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
     FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }

@@ -248,7 +248,7 @@ def beside_legs(
     ]
     wide, high = metrics.horizontalAdvance(text), metrics.capHeight()
     point = QPointF(wanted)
-    while True:
+    while math.isfinite(point.x()):
         box = QRectF(point.x(), point.y() - high, wide, high)
         around = box.adjusted(-thick - 1, -thick - 1, thick + 1, thick + 1)
         met = [one.x() + thick + 2 for one in drawn if around.contains(one)]
@@ -257,6 +257,7 @@ def beside_legs(
             taken.append(box)
             return point
         point.setX(max(point.x() + 1.0, max(met)))
+    return point
 
 
 Named = tuple[str, QRectF, Sequence[QPointF]]  # a name, where it stands, and the joints that it names

@@ -155,9 +155,9 @@ class Signals(QWidget):
 
     def _meet(self, station: Station) -> None:
         """Show another robot as it is: nobody has paused that one."""
-        if station is not self._met:
-            self._met = station
+        if self._met not in (None, station):
             self.pause.setChecked(False)
+        self._met = station
 
     @property
     def chosen(self) -> list[str]:
@@ -181,6 +181,7 @@ class Signals(QWidget):
         if not self.show_at(at_ns):
             self.pause.setChecked(False)  # nothing else is shown in its place as if it were that
             self._is_gone = True
+            self._follow()
             self.read_now()
 
     def save_csv(self, path: Path) -> None:
@@ -237,19 +238,18 @@ class Signals(QWidget):
         splitter.setSizes([self._theme.px(190), self._theme.px(700)])
 
     def _bind(self) -> None:
-        tools = self.tools
-        tools.looked.connect(self._look_wider)
-        tools.turned.connect(self._turn)
-        tools.noted.connect(self._note)
+        self.tools.looked.connect(self._look_wider)
+        self.tools.turned.connect(self._turn)
+        self.tools.noted.connect(self._note)
         self.span.currentIndexChanged.connect(self._span_changed)
         self.pause.toggled.connect(self._paused)
         self.fit.clicked.connect(self._follow)
         self.box.toggled.connect(self._choose_by_box)
         self.cursors.toggled.connect(self._show_cursors)
-        tools.expression.toggled.connect(self.expression.open)
-        tools.trigger.toggled.connect(self._show_trigger)
-        tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
-        tools.as_png.clicked.connect(lambda: self._ask("png", self.save_png))
+        self.tools.expression.toggled.connect(self.expression.open)
+        self.tools.trigger.toggled.connect(self._show_trigger)
+        self.tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
+        self.tools.as_png.clicked.connect(lambda: self._ask("png", self.save_png))
 
     def _build(self) -> None:
         """Make the plots anew; what part of the time is in sight stays."""
@@ -326,7 +326,8 @@ class Signals(QWidget):
     def _paused(self, on: bool) -> None:
         self._jump, self._is_gone = None, False
         self.scene.go_on()
-        if on:
+        if on and (station := self._desk.selected) is not None:
+            self.scene.look(station)
             self.scene.freeze()
 
     def _follow(self) -> None:

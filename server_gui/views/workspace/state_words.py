@@ -9,7 +9,7 @@ from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.marks import old_text
 from server_gui.views.workspace.jump import Jump
 
-GONE: Final = "Live: that instant is gone from here, see Recordings"
+GONE: Final = "Gone from here, see Recordings; this is live"
 
 
 def state_words(

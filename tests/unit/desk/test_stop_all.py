@@ -95,7 +95,7 @@ def test_a_robot_without_a_link_is_not_confirmed_with_its_reason_and_what_to_do(
         "STOP ALL: 1 of 2 robots stopped, 6/12 drives confirmed in 34 ms; "
         f"exo-02 STOP NOT CONFIRMED: {NOTHING_SENT}: there is no link → use the hardware stop"
     )
-    assert result.wordings[-1] == "STOP ALL: 1 of 2 robots stopped; exo-02 STOP NOT CONFIRMED"
+    assert result.wordings[-2] == "STOP ALL: 1 of 2 robots stopped; exo-02 STOP NOT CONFIRMED"
 
 
 def test_drives_of_a_robot_that_was_never_reached_are_not_counted_as_none(two: Bench) -> None:
@@ -334,7 +334,7 @@ def test_a_robot_that_is_removed_before_it_has_stopped_stays_named(
     assert said(two) == f"STOP ALL: 1 of 2 robots stopped, 6 drives confirmed in 34 ms; {told}"
     result = two.desk.stopped_all
     assert result is not None
-    assert result.wordings[-1] == "STOP ALL: 1 of 2 robots stopped; exo-02 removed, STOP NOT CONFIRMED"
+    assert result.wordings[-2] == "STOP ALL: 1 of 2 robots stopped; exo-02 removed, STOP NOT CONFIRMED"
     assert mark(two) == "bad"
     first.reset()
     two.commands[0].answer(OFF)
@@ -359,7 +359,7 @@ def test_a_robot_that_is_removed_without_a_link_is_no_better_known_to_be_stopped
     )
     result = two.desk.stopped_all
     assert result is not None
-    assert result.wordings[-1].endswith("; exo-02 removed, confirmed it, as far as is known: no link")
+    assert result.wordings[-2].endswith("; exo-02 removed, confirmed it, as far as is known: no link")
     assert mark(two) == "warn"
 
 
