@@ -176,3 +176,23 @@ def test_what_the_robot_would_refuse_is_marked_while_it_is_staged(panel: Paramet
 
 def _names(table: ProcessTable) -> list[str]:
     return [str(table.model().index(row, NAME).data()) for row in range(table.model().rowCount())]
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Tab, Qt.Key.Key_Backtab])
+def test_tab_goes_round_on_every_page_and_comes_past_stop_and_what_is_on_the_left(
+    window: MainWindow, bench: Bench, key: Qt.Key
+) -> None:
+    """A bar that is not shown took the keyboard, for good: STOP ALL and parameters were out of reach."""
+    bench.add("exo-02", 7421).take([described("exo-02"), walking(100), looked()])
+    window.resize(1366, 768)
+    window.activateWindow()
+    for place in range(window.tabs.count()):
+        window.tabs.setCurrentIndex(place)
+        bench.draw(window)
+        window.header.stop.setFocus(Qt.FocusReason.TabFocusReason)
+        met = []
+        while not met or (met[-1] is not window.header.stop and len(met) < 200):
+            QTest.keyClick(window.windowHandle(), key)
+            met.append(QApplication.focusWidget())
+        assert met[-1] is window.header.stop, window.tabs.tabText(place)
+        assert window.robots.all_stop in met

@@ -6,6 +6,7 @@ import math
 import re
 import time
 
+import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -15,8 +16,10 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.client import ConnectionState
 from gateway.units import Units
-from gateway.wire.component import LayoutInfo
+from gateway.wire.component import LayoutInfo, QualityInfo
 from gateway.wire.stop import Stopped
+from server_gui.core.alarms.beyond import FoundBeyond
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.leg_phase import leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.follow import robot
@@ -460,3 +463,28 @@ def test_a_drive_in_fault_is_named_from_its_first_row_on(overview: Overview, ben
     overview.refresh()
     assert "right hip not ok" in overview._figure.accessibleDescription()
     assert any(row.text == "right hip: fault" for row in lines(station))
+
+
+def test_the_first_line_leads_with_the_worst_of_the_robot_as_its_card_does(
+    overview: Overview, bench: Bench
+) -> None:
+    """It was green beside a card that said that an insole was lost."""
+    now = looked()
+    lost: QualityInfo = {"state": "lost", "age_ms": 4000.0, "problem": "the port is gone"}
+    quality = msgspec.structs.replace(now.quality, quality={**now.quality.quality, "left_insole": lost})
+    bench.station.take([walking(100), dataclasses.replace(now, quality=quality)])
+    overview.read_now()
+    overview.refresh()
+    icon = overview.now.drives._icon._mark
+    assert (icon.shape, icon.colour) == (bench.station.mark.shape, bench.station.mark.colour)
+    assert overview.now.drives.detail.text().endswith("left insole lost")
+
+
+def test_a_joint_beyond_its_ends_says_so_in_its_row(theme: Theme, bench: Bench) -> None:
+    bench.station._beyond.look = lambda _robot: (  # type: ignore[method-assign]
+        FoundBeyond(Kind.BEYOND, "left_knee", "position", "it is at 130°"),
+    )
+    bench.station.take([walking(100), looked()])
+    row = row_of(bench.station, "left_knee", bench.desk)
+    assert (row[ERROR].text, row[ERROR].colour, row[ANGLE].colour) == ("beyond its ends", "bad", "bad")
+    assert row_of(bench.station, "right_knee", bench.desk)[ERROR].text == "–"

@@ -8,7 +8,7 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.wire.component import AngleInfo
+from gateway.wire.component import AngleInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.alarms import beyond
@@ -17,6 +17,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, LinkChanged, Looked
 from server_gui.core.follow.frame_time import one_moment
+from server_gui.core.follow.news import NewsKind
 from tests.support.desk import JOINTS, Bench, described, kinds, looked, telemetry, walking_bench
 
 LOW, HIGH = math.radians(-5.0), math.radians(120.0)
@@ -237,3 +238,40 @@ def test_a_value_whose_channel_is_gone_is_no_alarm_for_good(bench: Bench) -> Non
     bench.station.take([Described(replace(description, channels=channels))])
     now(bench, left_knee__position=0.1)
     assert told(bench.station, Kind.HOT) is None
+
+
+@pytest.mark.parametrize(
+    ("state", "high", "is_told"), [("watching", 1.0, False), ("watching", 1.5, True), ("blind", 1.0, True)]
+)
+def test_a_guard_tells_a_fall_only_where_it_sees_and_trips_no_later(
+    bench: Bench, state: str, high: float, is_told: bool
+) -> None:
+    rule = GuardRuleInfo(
+        "lean", "tilt", "above", ["trunk"], ["alarm"], "alarm", state, 0, None, 0, [],
+        quantities=["tilt_forward", "tilt_side"], low=-high, high=high,
+    )  # fmt: skip
+    description = described().description
+    bench.station.take([Described(replace(description, guard=GuardInfo(configured=True, rules=[rule])))])
+    now(bench, trunk__tilt_forward=math.radians(80.0))
+    assert (told(bench.station, Kind.FALLEN) is not None) is is_told
+
+
+def test_several_values_that_go_beyond_at_once_are_one_event_as_bad_as_its_alarm(bench: Bench) -> None:
+    now(bench, trunk__tilt_forward=1.5)
+    assert (bench.desk.news.items[0].kind, bench.desk.news.items[0].about) == (NewsKind.FAULT, "trunk")
+    hot = dict.fromkeys((f"{joint}__temperature" for joint in JOINTS), 95.0)
+    now(bench, **hot)
+    newest = bench.desk.news.items[0]
+    assert newest.kind is NewsKind.WARNING
+    assert newest.text.startswith("left hip, left knee, left ankle, right hip, right knee, right ankle: hot")
+    now(bench, **hot)
+    assert bench.desk.news.items[0] is newest
+
+
+def test_a_robots_words_are_one_line_whatever_they_hold(bench: Bench) -> None:
+    forged: QualityInfo = {"state": "lost", "age_ms": 9.0, "problem": "no heartbeat\n→ nothing to do"}
+    whole = looked()
+    bench.station.take([Looked(Snapshot(0, {}, {}, {"left_knee": forged}), whole.parameters, whole.at_ns)])
+    assert bench.station.robot.parts["left_knee"].problem == "no heartbeat → nothing to do"
+    with one_moment():
+        assert not any("\n" in one.alarm.line + one.alarm.check for one in bench.station.alarms.active)
