@@ -4,7 +4,15 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QStatusBar,
+    QVBoxLayout,
+    QWidget,
+)
 
 from server_gui.views.widgets.free_place import KEPT, free_place
 from server_gui.views.widgets.plain import PlainLabel
@@ -69,7 +77,8 @@ class Question(QDialog):
         frame = window.frameGeometry().size() - window.size()  # a question has much the same
         room = in_sight(window)
         stops: Watched = window.findChildren(StopButton)
-        kept = [list(_seen(widgets)) for widgets in (stops, _results(window), *watched)]
+        bars: Watched = window.findChildren(QStatusBar)  # whether it records, and what F12 is
+        kept = [list(_seen(widgets)) for widgets in (stops, _results(window), *watched, bars)]
         self._before = kept[0] + kept[1]
         sizes = [self._fit(wide) + frame for wide in WIDTHS]
         place = free_place(sizes, room, kept)

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from gateway.wire.resource import ProcessUse
 from server_gui.core.processing.process_names import arguments_of
@@ -190,7 +190,7 @@ def test_tab_goes_round_on_every_page_and_comes_past_stop_and_what_is_on_the_lef
         window.tabs.setCurrentIndex(place)
         bench.draw(window)
         window.header.stop.setFocus(Qt.FocusReason.TabFocusReason)
-        met = []
+        met: list[QWidget | None] = []
         while not met or (met[-1] is not window.header.stop and len(met) < 200):
             QTest.keyClick(window.windowHandle(), key)
             met.append(QApplication.focusWidget())

@@ -480,10 +480,11 @@ def test_the_first_line_leads_with_the_worst_of_the_robot_as_its_card_does(
     assert overview.now.drives.detail.text().endswith("left insole lost")
 
 
-def test_a_joint_beyond_its_ends_says_so_in_its_row(theme: Theme, bench: Bench) -> None:
-    bench.station._beyond.look = lambda _robot: (  # type: ignore[method-assign]
-        FoundBeyond(Kind.BEYOND, "left_knee", "position", "it is at 130°"),
-    )
+def test_a_joint_beyond_its_ends_says_so_in_its_row(
+    theme: Theme, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = (FoundBeyond(Kind.BEYOND, "left_knee", "position", "it is at 130°"),)
+    monkeypatch.setattr(bench.station._beyond, "look", lambda _robot: found)
     bench.station.take([walking(100), looked()])
     row = row_of(bench.station, "left_knee", bench.desk)
     assert (row[ERROR].text, row[ERROR].colour, row[ANGLE].colour) == ("beyond its ends", "bad", "bad")

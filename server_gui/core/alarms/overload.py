@@ -10,6 +10,9 @@ from server_gui.core.follow.missing_pdos import BUSY_PERCENT
 from server_gui.core.follow.robot import Robot
 
 OURS: Final = "this computer is overloaded, end other programs on it first"
+BOTH: Final = (
+    "this computer and the robot's computer are overloaded, see what keeps them busy first (gwrms blame)"
+)
 THEIR_LOAD: Final = "the robot's computer is overloaded"
 THEIRS: Final = f"{THEIR_LOAD}, see what keeps it busy first (gwrms blame)"
 BLAMED: Final = (
@@ -56,6 +59,7 @@ def load_first(
     every = first
     for one in found:
         first = tuple(said for said in every if said != THEIRS or THEIR_LOAD not in one.what)
+        first = (BOTH,) if len(first) > 1 else first
         if not first or one not in late:
             yield one
         elif one.kind in PARTS and not is_of_all:

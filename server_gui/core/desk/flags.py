@@ -24,6 +24,9 @@ HERE: Final = frozenset({"127.0.0.1", "[::1]", "::1"})
 JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
 
 
+NOTICED_NS: Final = 2_000_000_000  # so long a fault is noticed after its row at most
+
+
 class FlagKind(Enum):
     """What sort of thing happened; the word is shown."""
 
@@ -76,6 +79,16 @@ class Flags:
         """Return those from one instant up to before another."""
         first = bisect.bisect_left(self._flags, begin_ns, key=_at)
         return self._flags[first : bisect.bisect_left(self._flags, end_ns, key=_at)]
+
+    def instant_of_fault(self, component: str, at_ns: int) -> int:
+        """Return when a component fell into the fault that was noticed at this instant; that where not known.
+
+        What is noticed is later than what the rows show.
+        """
+        spoken = component.replace("_", " ")
+        near = self.between(at_ns - NOTICED_NS, at_ns + NOTICED_NS)
+        known = [one.at_ns for one in near if one.kind is FlagKind.FAULT and spoken in _names(one.text)]
+        return min(known, key=lambda found: abs(found - at_ns), default=at_ns)
 
     def clear(self) -> None:
         """Forget them: the clock has begun anew."""
@@ -230,6 +243,11 @@ def _kind(word: str) -> FlagKind | None:
     if "fault" in word.lower():
         return FlagKind.FAULT
     return FlagKind.STOP if "quick stop" in word.lower() else None
+
+
+def _names(text: str) -> list[str]:
+    """Return whom a flag names, as a fault does: `left hip, left knee: fault`."""
+    return text.partition(": ")[0].split(", ")
 
 
 def _spoken(channel: str) -> str:

@@ -128,7 +128,8 @@ class AlarmStrip(ClickableFrame):
         station, one = told
         if station is not None and one.alarm.channel is not None and one.at_ns is not None:
             self.list.hide()
-            self.shown.emit(station, one.alarm.channel, one.at_ns)
+            at_ns = station.flags.instant_of_fault(one.alarm.subject, one.at_ns)
+            self.shown.emit(station, one.alarm.channel, at_ns)
 
     def show_resources(self, told: Told) -> None:
         """Bring the page of what keeps its robot's computer busy."""

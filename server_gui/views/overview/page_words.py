@@ -49,7 +49,8 @@ def age_texts(station: Station) -> tuple[str, ...]:
     """Return how old the values are."""
     if not station.is_live:
         return old_text(station)
-    return (f"age {age_text(station.robot.age_s())}",)
+    then = "then " if station.robot.is_recording else ""
+    return (f"age {then}{age_text(station.robot.age_s())}",)
 
 
 def angle_texts(pose: Pose, unit: Unit) -> list[str]:

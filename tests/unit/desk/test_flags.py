@@ -290,3 +290,16 @@ def test_a_stop_that_is_not_confirmed_has_a_flag_also_where_no_data_came(bench: 
     station.stop("again")
     bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
     assert [one.kind for one in station.flags].count(FlagKind.UNPROVEN) == 1
+
+
+def test_a_fault_is_shown_where_its_rows_begin_not_where_somebody_noticed_it() -> None:
+    flags = Flags()
+    flags.add(
+        Flag(1_000, "right hip: fault 0x2310", FlagKind.FAULT),
+        Flag(1_500, "left hip, right knee: fault", FlagKind.FAULT),
+        Flag(2_000, "right hip", FlagKind.MARK),
+    )
+    assert flags.instant_of_fault("right_hip", 400_000_000) == 1_000
+    assert flags.instant_of_fault("right_knee", 400_000_000) == 1_500
+    assert flags.instant_of_fault("left_knee", 400_000_000) == 400_000_000
+    assert flags.instant_of_fault("right_hip", 9_000_000_000) == 9_000_000_000, "another one, long before"

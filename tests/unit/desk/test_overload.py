@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import pytest
 from msgspec.structs import replace
 
-from server_gui.core.alarms.overload import OURS, THEIRS
+from server_gui.core.alarms.overload import BOTH, OURS, THEIRS
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.own_load import EVERY_S, LASTS_S, OLD_S, OwnLoad
@@ -49,7 +49,7 @@ def check(station: Station) -> str:
 
 @pytest.mark.parametrize(
     ("percent", "is_ours", "first"),
-    [(21.5, False, ()), (97.0, False, (THEIRS,)), (21.5, True, (OURS,)), (97.0, True, (THEIRS, OURS))],
+    [(21.5, False, ()), (97.0, False, (THEIRS,)), (21.5, True, (OURS,)), (97.0, True, (BOTH,))],
 )
 def test_an_overloaded_computer_is_said_before_the_cable_of_what_is_not_the_only_one(
     station: Station, percent: float, is_ours: bool, first: tuple[str, ...]
