@@ -1,8 +1,14 @@
 """What has room in the strip of alarms, and what goes first where there is little."""
 
+import time
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from gateway.wire.stop import Stopped
+from server_gui.core.commissioning.alarm import unstopped
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.stages import LOOKS, Stage
 from server_gui.views.alarms.words import REMEDY
 from server_gui.views.frame.main_window import MainWindow
@@ -53,16 +59,42 @@ def test_what_to_check_has_room_before_the_register_of_a_code(
     assert REMEDY in said
 
 
+def commissioned(stage: Stage) -> Commissioning:
+    """A robot at this stage."""
+    known = SimpleNamespace(
+        name="exo-09", look_of=LOOKS[stage], since_s=time.time(), stage=stage, problem="knee"
+    )
+    return cast("Commissioning", known)
+
+
+def test_a_commissioned_robot_that_has_not_stopped_comes_before_another_ones_warning(
+    around: Around, bench: Bench
+) -> None:
+    """A yellow line of the other one hid it."""
+    bench.station.take([walking(300), looked(state="stale")])
+    bench.desk.commissioned_alarm = lambda: unstopped(commissioned(Stage.NOT_CONFIRMED))
+    settle(around, bench)
+    assert around.alarms.headline.text() == "STOP NOT CONFIRMED: exo-09: knee"
+    assert around.alarms.property("tone") == "urgent"
+    around.alarms.acknowledge(around.alarms.told[0])
+    settle(around, bench)
+    assert any("exo-09" in text and "acknowledged" in text for text in around.alarms.texts)
+    bench.desk.commissioned_alarm = lambda: unstopped(commissioned(Stage.STOPPED))
+    settle(around, bench)
+    assert not any("exo-09" in text for text in around.alarms.texts)
+
+
 @pytest.mark.parametrize("stage", [Stage.STOPPED, Stage.NOT_CONFIRMED, Stage.MOVING])
 def test_what_is_wrong_with_a_robot_that_is_commissioned_is_told_where_there_is_no_alarm(
     around: Around, bench: Bench, stage: Stage
 ) -> None:
     bench.station.take([walking(300), looked()])
-    around.alarms.commissioned = lambda: ("exo-09", LOOKS[stage])
+    around.alarms.commissioned = lambda: commissioned(stage)
     settle(around, bench)
     assert around.alarms.headline.text() == f"exo-09 · {LOOKS[stage].mark.word}"
     assert around.alarms.property("tone") == LOOKS[stage].mark.colour
-    around.alarms.commissioned = lambda: ("exo-09", LOOKS[Stage.WORKING])
+    assert around.alarms.details.text().startswith("since ")
+    around.alarms.commissioned = lambda: commissioned(Stage.WORKING)
     settle(around, bench)
     assert "exo-09" not in around.alarms.headline.text()
 

@@ -93,7 +93,8 @@ class Commissioning:
     def __init__(self, talk: Talk, clock: Callable[[], float] = time.monotonic, who: str = "") -> None:
         self.who = who  # sits at the window; "": it was not said
         self.wish: CommissioningRequest | None = None
-        self.stage = Stage.NOT_STARTED
+        self._stage = Stage.NOT_STARTED
+        self.since_s = time.time()  # UTC: of the stage
         self.question: Message | None = None
         self.steps: tuple[StepMessage, ...] = ()
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
@@ -120,6 +121,16 @@ class Commissioning:
         self._heard_s = 0.0
 
     # --- what is so
+
+    @property
+    def stage(self) -> Stage:
+        """The present one."""
+        return self._stage
+
+    @stage.setter
+    def stage(self, stage: Stage) -> None:
+        if stage is not self._stage:
+            self._stage, self.since_s = stage, time.time()
 
     @property
     def look_of(self) -> StageView:

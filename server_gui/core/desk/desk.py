@@ -54,6 +54,7 @@ class Desk:
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
+        self.commissioned_alarm: Callable[[], Alarm | None] = lambda: None
         self.commissions: Callable[[], bool] = lambda: False  # whether a robot is commissioned in this window
         self.on_select: list[Callable[[Station | None], None]] = []
 
@@ -120,14 +121,22 @@ class Desk:
             station.acknowledge(alarm)
         elif alarm.kind in LEFT:
             self._left.pop(alarm.key, None)
+        elif alarm.kind is Kind.NOT_STOPPED:
+            self._alarms.acknowledge(alarm.key)
         else:
             self.recording.alarms.acknowledge(alarm.key)
 
     @property
     def alarms(self) -> Alarms:
-        """Robots that were removed while they were not known to be off, until they are seen again here."""
+        """Of robots that are not in the list.
+
+        Those that were removed while they were not known to be off, until they are seen again here, and one
+        that is commissioned.
+        """
         self._left = {key: one for key, one in self._left.items() if not one.is_seen_in(self.stations)}
-        self._alarms.look((one.alarm for one in self._left.values()), time.time())
+        commissioned = self.commissioned_alarm()
+        left = [one.alarm for one in self._left.values()]
+        self._alarms.look([*left, *([] if commissioned is None else [commissioned])], time.time())
         return self._alarms
 
     def select(self, station: Station | None) -> None:

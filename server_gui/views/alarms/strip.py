@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout
 
 from server_gui.core.alarms.alarm import MORE
 from server_gui.core.alarms.texts import UNSTOPPED
-from server_gui.core.commissioning.stages import StageView
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
 from server_gui.views.alarms.words import (
@@ -23,11 +23,12 @@ from server_gui.views.alarms.words import (
     headline,
     in_order,
     key_of,
+    lasting,
     leading,
     now_s,
     quiet,
 )
-from server_gui.views.marks import Mark
+from server_gui.views.marks import Mark, time_of_day
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.clickable_frame import ClickableFrame
@@ -59,9 +60,7 @@ class AlarmStrip(ClickableFrame):
         self._said: object = None  # what was fitted last
         self._changed_s = -HOLD_S  # when another alarm took the place of one
         self.told: tuple[Told, ...] = ()
-        self.commissioned: Callable[[], tuple[str, StageView] | None] = lambda: (
-            None
-        )  # its name, and how it is
+        self.commissioned: Callable[[], Commissioning | None] = lambda: None
         self.setAccessibleName("Active alarms")
         self._icon, self._words = MarkIcon(theme, 13), _Words()
         self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
@@ -152,9 +151,10 @@ class AlarmStrip(ClickableFrame):
     def _beside(self) -> tuple[Mark, str, str]:
         """Return what is no alarm of a robot here: of one that is commissioned, or none."""
         commissioned = self.commissioned()
-        if commissioned is not None and commissioned[1].mark.colour in ("warn", "bad"):
-            name, look = commissioned
-            return look.mark, f"{name} · {look.mark.word}", look.words
+        if commissioned is not None and (mark := commissioned.look_of.mark).colour in ("warn", "bad"):
+            since_s, said = commissioned.since_s, commissioned.look_of.words
+            since = f"{SINCE}{time_of_day(since_s)}, for {lasting(max(0.0, time.time() - since_s))}"
+            return mark, f"{commissioned.name} · {mark.word}", f"{since} · {said}"
         return quiet(self._desk.selected, self._desk.recording)
 
     def _turn(self) -> None:

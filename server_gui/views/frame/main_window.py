@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 
 from server_gui.core.alarms.explaining_signals import explaining_signals
 from server_gui.core.archive.archive import Archive
+from server_gui.core.commissioning.alarm import unstopped
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.stages import Stage
 from server_gui.core.desk.desk import Desk
@@ -155,7 +156,8 @@ class MainWindow(QMainWindow):
         if commissioning is not None:
             desk.commissions = lambda: commissioning.wish is not None
             self.header.commissioned = lambda: commissioning.name if commissioning.runs else ""
-            self.alarms.commissioned = lambda: (commissioning.name, commissioning.look_of)
+            self.alarms.commissioned = lambda: commissioning
+            desk.commissioned_alarm = lambda: unstopped(commissioning)
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)
