@@ -15,7 +15,9 @@ from gateway.commission.nodes import OBSERVER, file_of
 
 CONTROLLER = "device.controller"
 NONE = "none"
-DRIVES_ONLY = "A STOP will reach the drives only, and what commands them goes on: gwrms check warns of it."
+DRIVES_ONLY = (
+    "A STOP will reach the drives only: whatever commands them keeps running (gwrms check warns of it)"
+)
 _OBJECT = re.compile(r"0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})")
 
 

@@ -10,7 +10,7 @@ from gateway.units import with_minus
 NOT_SAID: Final = "not known"
 CONFIRMED: Final = "confirmed"
 NOT_CONFIRMED: Final = "NOT CONFIRMED"
-DRIVES_ONLY: Final = "A STOP will reach the drives only, and what commands them goes on"
+DRIVES_ONLY: Final = "A STOP will reach the drives only"  # with which the command says so
 MOVED: Final = "counts moved"  # unit of how far a drive has counted since it was asked to be moved
 LEAST_MOVE: Final = 50  # as the command judges it
 CLEARLY: Final = 10  # times as far as any other drive

@@ -64,7 +64,7 @@ class Bar(QWidget):
         row.addWidget(self.stop)
         everything.addLayout(row)
         self.drives_only = WrappingLabel()
-        self.drives_only.setText(f"▲ {DRIVES_ONLY}.")
+        self.drives_only.setText(f"▲ {DRIVES_ONLY}: whatever commands them keeps running.")
         self.drives_only.hide()
         everything.addWidget(self.drives_only)
         everything.addWidget(self.words)

@@ -32,7 +32,7 @@ from server_gui.views.models.calibration import CalibrationPlot, Curve
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text, set_tone
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, unbroken
 
 TITLES: Final = ("", "This model", "Other", "Points", "Verdict", "Decisions")
 NAME, ONE, OTHER, DIFFERENCE, VERDICT, DECISIONS = range(len(TITLES))
@@ -168,7 +168,7 @@ class Compare(Card):
         set_text(self.warning, f"▲ {lost}")
         self.warning.setVisible(bool(lost))
         told = "\n".join(filter(None, (self._judged, " ".join(notes(entry, other)))))
-        set_text(self.notes, told)
+        set_text(self.notes, unbroken(told))
         self.notes.setVisible(bool(told))
         self._fill_rows(rows(entry.card, None if other is None else other.card))
         self.table.setMinimumHeight(self._high())
