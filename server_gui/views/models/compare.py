@@ -206,6 +206,7 @@ class Compare(Card):
         cells = [row.name, percent(row.one), percent(row.other), signed(row.difference), words, count]
         item = QTreeWidgetItem(top, [plain(cell) for cell in cells])
         item.setForeground(VERDICT, self._theme.colour(colour))
+        item.setTextAlignment(VERDICT, Qt.AlignmentFlag.AlignCenter)  # numbers stand beside it
         for column in (ONE, OTHER, DIFFERENCE, DECISIONS):
             item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             item.setFont(column, self._theme.number_font())

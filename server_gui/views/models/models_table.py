@@ -43,7 +43,7 @@ class ModelsModel(RowsModel[Entry]):
                 words = "; ".join(entry.signed) if column == SIGNED else ""
                 return tip(f"{words or _cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
-                return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+                return Qt.AlignmentFlag.AlignCenter  # words stand beside them
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
                 return self._theme.number_font()
         return None
