@@ -61,16 +61,19 @@ class Question(QDialog):
             column.addWidget(field)
         column.addLayout(buttons)
         self._column = column
+        self.is_moot: Callable[[], bool] = lambda: False
         (field or self.cancel).setFocus()
         self._before: list[QRect] = []  # where STOPs and their results were at the last look
+        self._over = parent.window()
         looks = QTimer(self, interval=LOOK_MS)
-        looks.timeout.connect(lambda: self._leave_stops(parent.window()))
+        looks.timeout.connect(lambda: self._look(self._over))
         looks.start()
 
     def add(self, field: QLineEdit) -> None:
-        """Add another field, above the buttons."""
+        """Add another field, above the buttons; it needs room, which is looked for again."""
         self._column.insertWidget(self._column.count() - 1, field)
         QWidget.setTabOrder(self.field or self.words, field)
+        self.keep_in_sight(self._over, ())
 
     def keep_in_sight(self, window: QWidget, watched: Sequence[Watched]) -> None:
         """Lie over no STOP of the window, and over what is watched as little as can be, the first least."""
@@ -84,6 +87,13 @@ class Question(QDialog):
         place = free_place(sizes, room, kept)
         self._fit(WIDTHS[sizes.index(place.size())])
         self.move(place.topLeft())
+
+    def _look(self, window: QWidget) -> None:
+        """Go where it asks what is so no more; else leave what has come to lie under it."""
+        if self.is_moot():
+            self.reject()
+        else:
+            self._leave_stops(window)
 
     def _leave_stops(self, window: QWidget) -> None:
         """Leave a STOP, or the result of one, that has come to lie under it; where none has moved, stay."""
@@ -107,16 +117,18 @@ def ask(
     do: Callable[[], None],
     field: QLineEdit | None = None,
     watched: Sequence[Watched] = (),
+    is_moot: Callable[[], bool] = lambda: False,
 ) -> Question:
     """Show a question; `do` is called when `action` is chosen. One of a title at a time.
 
-    It leaves every STOP in sight, and what is `watched`, the most important first.
+    It leaves every STOP in sight, and what is `watched`, the most important first. It goes once it `is_moot`.
     """
     for known in parent.findChildren(Question):
         if known.windowTitle() == title and known.isVisible():
             known.raise_()
             return known
     question = Question(parent, title, text, action, do, field)
+    question.is_moot = is_moot
     question.keep_in_sight(parent.window(), watched)
     question.show()
     return question

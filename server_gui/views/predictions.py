@@ -272,7 +272,8 @@ def lines(station: Station) -> Iterator[PredictionRow]:
         yield from _danger(predictions)
     for rule in predictions.rules:
         yield PredictionRow(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
-    told = {alarm.subject: alarm for alarm in station.alarms.each}
+    worst_last = sorted(station.alarms.each, key=lambda alarm: -alarm.rank)
+    told = {alarm.subject: alarm for alarm in worst_last}
     for part in unwell(station):
         alarm = told.get(part.name)
         why = part.problem or (alarm.what if alarm is not None else "no reason known")

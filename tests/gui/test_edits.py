@@ -61,7 +61,10 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
     parts.edits.refresh()
     assert "step length (gait) 400 → 430 mm: worse" in parts.edits.verdict.text()
     assert "0.05993 °" in parts.edits.words.toolTip()
-    assert "(95 % interval +17.5 to +20.9 %); means 0.2867 → 0.3433 °" in parts.edits.words.text()
+    assert (
+        "(95 % interval +17.5 to +20.9 %); as measured, drift and all: 0.2867 → 0.3433 °"
+        in parts.edits.words.text()
+    )
     bench.desk.shown.change(Units(by_si={"m": "m", "rad": "rad"}))
     parts.edits.refresh()
     assert "step length (gait) 0.40 → 0.43 m: worse" in parts.edits.verdict.text()

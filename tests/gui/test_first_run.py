@@ -1,5 +1,6 @@
 """The first minutes: what the empty window offers, the splash, breaking the simulated robot, the tour."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.faulty import fault
 from tests.gui.rules import settle
 from tests.gui.running import wait
-from tests.support.desk import walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 LEGS = ("left_knee", "right_knee")
 KINDS = {
@@ -128,7 +129,8 @@ def test_walking_is_offered_where_it_is_over_and_no_stop_is_held_and_the_simulat
     assert "It walks" in demo.bar.walk.toolTip()
     fault(bench)
     demo.draw()
-    assert demo.bar.walk.isEnabled()
+    assert not demo.bar.walk.isEnabled(), "five drives were enabled beside the one in fault"
+    assert demo.bar.walk.toolTip() == "In fault: left knee. Clear the fault first"
     assert demo.control.active == ()
     words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
     assert demo.bar.said.text() == words, "called whole once the cause is over"
@@ -137,6 +139,9 @@ def test_walking_is_offered_where_it_is_over_and_no_stop_is_held_and_the_simulat
     held = "Clear fault (which also ends the stop that is held), then Start walking"
     assert demo.bar.said.text() == f"Simulated robot. Tripped: left knee. {held}"
     bench.station.stopping.held = False
+    now_ns = time.monotonic_ns()
+    off: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    bench.station.take([telemetry([now_ns], off, now_ns), looked()])
     demo.draw()
     click(demo.bar.walk)
     demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")

@@ -196,3 +196,16 @@ def test_tab_goes_round_on_every_page_and_comes_past_stop_and_what_is_on_the_lef
             met.append(QApplication.focusWidget())
         assert met[-1] is window.header.stop, window.tabs.tabText(place)
         assert window.robots.all_stop in met
+
+
+def test_the_key_of_the_review_works_whatever_its_button_says(window: MainWindow, bench: Bench) -> None:
+    """It went with the button's text, which changes with what is staged."""
+    bench.look_again([described(), walking(100), looked()])
+    held = bench.station.robot.parameters["gait.step_length"]
+    for value in (0.42, 0.43):
+        bench.station.edits.stage("gait.step_length", value, held)
+        bench.draw(window)
+    window.activateWindow()
+    window.parameters.tree.setFocus()
+    QTest.keyClick(window.parameters.tree, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert window.parameters.review.isVisible()

@@ -9,7 +9,7 @@ from gateway.client import NotConnected
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.overview.joint_cells import ERROR, STATE, STOP
+from server_gui.views.overview.joint_cells import ERROR, NONE, STATE, STOP
 from server_gui.views.overview.joint_table import JointModel
 from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
@@ -135,4 +135,4 @@ def test_a_drive_that_is_enabled_again_has_no_proof_of_an_old_stop(theme: Theme,
     words = {str(bench.station.robot.word(f"{joint}.state")) for joint in JOINTS}
     assert words == {"operation enabled"}
     shown = [model.index(row, STOP).data() for row in range(model.rowCount())]
-    assert set(shown) == {"enabled again"}
+    assert set(shown) == {NONE}

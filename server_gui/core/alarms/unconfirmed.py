@@ -120,7 +120,8 @@ def remedy(robot: Robot, stopping: StopProgress) -> tuple[str, ...]:
     if stopping.is_outdated:
         return (USE_HARDWARE,)
     if silent_controllers(robot, stopping):
-        return KEEP_AT_HAND, f"check {', '.join(_spoken_node(robot, name) for name in stopping.silent)}"
+        which = ", ".join(_spoken_node(robot, name) for name in stopping.silent)
+        return STOP_AGAIN, KEEP_AT_HAND, f"check {which}"
     if is_live(robot) and not unknown_joints(robot) and not moving_joints(robot):
         return ("STOP again to be sure",)
     return (STOP_AGAIN, f"or {USE_HARDWARE}") if is_live(robot) else (USE_HARDWARE,)

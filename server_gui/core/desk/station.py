@@ -185,8 +185,8 @@ class Station:
         is_busy, entries = self.is_overloaded(), self.audit.entries
         known = (self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
         facts = Facts(*known, self._beyond.look(self.robot))
-        if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
-            self.stopping.was_ended = False
+        if (self.stopping.was_ended or self.stopping.proofs) and any_enabled(self.robot) and self.is_live:
+            self.stopping.goes_on()
         self._alarms.look(
             found(facts),
             now_s,

@@ -192,6 +192,11 @@ class StopProgress:
             self.is_outdated = False
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
 
+    def goes_on(self) -> None:
+        """Note that drives are enabled again after a reset: what that stop has shown is history."""
+        if self.state is StopState.IDLE and not self.held:
+            self.was_ended, self.proofs = False, {}
+
     # --- what the robot shows meanwhile
 
     def described(self, held: bool, reason: str | None, *, is_anew: bool = False) -> None:
@@ -201,7 +206,8 @@ class StopProgress:
         """
         self._hears(held)
         if held and not self.held and self.state is StopState.IDLE:
-            self.since_s, self.was_ended = None, False  # the journal, or our own STOP, tells since when
+            self.proofs, self.was_ended = {}, False
+            self.since_s = None  # the journal, or our own STOP, tells since when
         self.held, self.reason = held, (reason or "") if held else ""
         if not held and self.state is StopState.CONFIRMED and (self._is_written or is_anew):
             self.was_reset(held=False)
@@ -397,6 +403,8 @@ class StopProgress:
             self.reason = _said(entry)
         if not self.held or self.since_s is None:
             self.since_s = self._utc_s(entry)
+        if not self.held and self.state is StopState.IDLE:
+            self.proofs = {}  # of a STOP that is over: it is another one that is held
         self._hears(True)
         self.held, self.was_ended = True, False
 

@@ -52,7 +52,7 @@ def meaning(text: str, channels: Channels, units: Units) -> CurveBinding:
         written = parse(text)
         missing = sorted(written.channels - channels.keys())
         if missing:
-            return CurveBinding(text, written.name, problem=not_here(missing))
+            return CurveBinding(text, written.name, problem=not_here(missing, is_told=bool(channels)))
         si = {name: channels[name].unit for name in written.channels}
         program = Program(written, text, si)
         shown = _shown(written, program.unit, channels, units)
@@ -68,11 +68,12 @@ def _shown(written: Written, si: str, channels: Channels, units: Units) -> Unit:
     return units.unit("" if only is None else only.quantity, si)
 
 
-def not_here(names: Iterable[str]) -> str:
+def not_here(names: Iterable[str], *, is_told: bool = True) -> str:
     """Return in words that these channels are missing."""
     beside = [name.removeprefix(BESIDE) for name in names if name.startswith(BESIDE)]
     here = [name for name in names if not name.startswith(BESIDE)]
-    said = [f"this robot has no {', '.join(here)}"] if here else []
+    told = f"this robot has no {', '.join(here)}" if is_told else "this robot has not told what it has"
+    said = [told] if here else []
     return "; ".join([*said, *([f"nothing beside it has {', '.join(beside)}"] if beside else [])])
 
 

@@ -26,6 +26,7 @@ from server_gui.core.workspace.trigger import Condition, On, Trigger, TriggerSta
 from server_gui.core.workspace.workspace import Workspace
 
 KEPT_S: Final = 100.0  # of the past, when a view stands still
+LEAST_S: Final = 10.0  # of what stands still, that is not given up for a curve
 BESIDE_KEY: Final = "\N{NULL}beside "  # no curve's text
 FAULT: Final = "fault"
 
@@ -189,13 +190,18 @@ class Scene:
         self.frozen = Frozen(times[:end], cut, newest_ns, station.rings.source, trigger_ns)
 
     def keep_more(self) -> None:
-        """Stand still as before, with the curves that there are now, as far as their rows are still there."""
+        """Stand still as before, with the curves that there are now, while their rows are still there.
+
+        Those that were shown stay also after that.
+        """
         kept, station = self.frozen, self._station
         if (
             kept is not None
             and station is not None
             and kept.source is station.rings.source
             and len(kept.times)
+            and len(rows := station.rings.times(KEPT_S))
+            and rows[0] <= max(float(kept.times[0]), float(kept.times[-1]) - LEAST_S)
         ):
             self.freeze(float(kept.times[-1]), kept.trigger_ns)
 

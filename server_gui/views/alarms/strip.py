@@ -38,6 +38,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
+NEWS_S: Final = 60.0
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
 
@@ -151,7 +152,8 @@ class AlarmStrip(ClickableFrame):
     def _beside(self) -> tuple[Mark, str, str]:
         """Return what is no alarm of a robot here: of one that is commissioned, or none."""
         commissioned = self.commissioned()
-        if commissioned is not None and (mark := commissioned.look_of.mark).colour in ("warn", "bad"):
+        if commissioned is not None and _is_news(commissioned):
+            mark = commissioned.look_of.mark
             since_s, said = commissioned.since_s, commissioned.look_of.words
             since = f"{SINCE}{time_of_day(since_s)}, for {lasting(max(0.0, time.time() - since_s))}"
             return mark, f"{commissioned.name} · {mark.word}", f"{since} · {said}"
@@ -227,6 +229,14 @@ class AlarmStrip(ClickableFrame):
         if self.height() != high or self.minimumHeight() != high:
             self.setFixedHeight(high)
         self._said = None
+
+
+def _is_news(commissioned: Commissioning) -> bool:
+    """Return whether how it is belongs before how others are: of what has ended well, only for a while."""
+    look = commissioned.look_of
+    is_over = look.mark.colour == "warn" and not look.runs
+    is_old = is_over and time.time() - commissioned.since_s > NEWS_S
+    return look.mark.colour in ("warn", "bad") and not is_old
 
 
 def _lacks(said: tuple[str, str]) -> tuple[bool, ...]:

@@ -396,7 +396,8 @@ def _strong(told: EditEvidence) -> list[Measured]:
 def _metric(one: Measured) -> str:
     name = one.title.replace("_", " ")
     means = f"{from_to(one.before, one.after)} {one.unit}".rstrip()
-    return f"{name} {one.word}: {share(one)} (95 % interval {interval(one)}); means {means}"
+    of_edit = f"{share(one)} (95 % interval {interval(one)})"
+    return f"{name} {one.word}: {of_edit}; as measured, drift and all: {means}"
 
 
 def _in_unit(one: Measured) -> str:

@@ -7,9 +7,11 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QMenu, QPushButton, QToolBar, QWidget
 
 from server_gui.core.alarms.marks import ENABLED
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.station import Station
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
+from server_gui.core.tuning.stop import StopState
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import Listed, SimControl, SimulatorRefuses
 from server_gui.views.first_run.fault_menu import fill, words
@@ -82,7 +84,7 @@ class DemoBar(QToolBar):
     def refresh(self) -> None:
         """Show how it is now."""
         held = self._station.stopping.held
-        why_not = HELD if held else WALKING if walks(self._station) else ""
+        why_not = HELD if held else WALKING if walks(self._station) else self._why_not()
         self.walk.setEnabled(not why_not and self._own.is_running)
         set_tip(self.walk, why_not or WALKS)
         self.breaking.setEnabled(bool(self._listed.faults) and self._own.is_running)
@@ -91,6 +93,13 @@ class DemoBar(QToolBar):
         self.tour.refresh()
 
     # --- inside
+
+    def _why_not(self) -> str:
+        """Return why it would be wrong to walk now: what does not stop, or is in fault."""
+        if self._station.stopping.state in (StopState.SENT, StopState.NOT_CONFIRMED):
+            return "A STOP is not confirmed yet"
+        tripped = self._tripped()
+        return f"In fault: {', '.join(map(words, tripped))}. Clear the fault first" if tripped else ""
 
     def _build(self) -> None:
         self.walk.clicked.connect(lambda: self._ask(self._control.walk))
@@ -156,11 +165,13 @@ class DemoBar(QToolBar):
             clear = f"Clear fault{ENDS if held else ''}"
             how = f"{REPAIR}, then {clear}" if broken else clear
             return f"{said if broken else 'Simulated robot'}. Tripped: {tripped}. {how}, then Start walking"
-        return f"{said}. A stop is held: reset it, then Start walking" if held else said
+        whose = f"A stop of {self._station.title} is held" if len(self._station.neighbours) > 1 else ""
+        whose = whose or "A stop is held"
+        return f"{said}. {whose}: reset it, then Start walking" if held else said
 
     def _tripped(self) -> list[str]:
         """Drives in fault: they stay so after what had tripped them is over, which may be at once."""
-        return [part.name for part in self._station.robot.not_ok() if "in fault" in (part.problem or "")]
+        return [one.subject for one in self._station.alarms.each if one.kind is Kind.FAULT]
 
     def _ask(self, work: Callable[[], None]) -> None:
         """Do this in the thread, and look then what is broken."""

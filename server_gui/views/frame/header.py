@@ -30,6 +30,7 @@ STOP_MARKS: Final = {
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Brief, and then left out, in this order where there is less room; alarms stand below the header.
+SPARE_PX: Final = 24  # at text of 100 %: what is brief stays so until there is more than just room
 BRIEF: Final = ("recording", "link", "drives")
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
 # Its result tells of the drives, and STOP has the robot's name: the age of what is seen goes last.
@@ -69,6 +70,7 @@ class Header(QWidget):
         self._row.addWidget(self.reset_button)
         self.menu = menu
         self._row.addWidget(menu)
+        self._was_brief: frozenset[str] = frozenset()  # at the last fit, in a window of this width
         self.commissioned: Callable[[], str] = lambda: ""  # the robot that is: its STOP is ours, too
         self.stop = StopButton()
         self.stop.stopped.connect(self.stopped)
@@ -104,6 +106,7 @@ class Header(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._was_brief = frozenset()
         self._fit()
 
     def _refresh_stop(self, station: Station | None) -> None:
@@ -144,11 +147,12 @@ class Header(QWidget):
         needs = {name: chips[name].needs() for name in shown}
         brief: set[str] = set()
 
-        def has_room() -> bool:
-            return sum(needs.values()) + len(needs) * spacing <= room
+        def has_room(name: str = "") -> bool:
+            spare = self._theme.px(SPARE_PX) if name in self._was_brief else 0
+            return sum(needs.values()) + len(needs) * spacing + spare <= room
 
         for name in BRIEF:
-            if name in needs and not has_room():
+            if name in needs and not has_room(name):
                 brief.add(name)
                 needs[name] = chips[name].needs(brief=True)
         if "robot" in needs and not has_room():
@@ -165,7 +169,7 @@ class Header(QWidget):
             least = needs.get(name, 0)
             if least:
                 needs[name] = chips[name].needs()
-                if has_room():
+                if has_room(name):
                     brief.discard(name)
                 else:
                     needs[name] = least
@@ -174,6 +178,7 @@ class Header(QWidget):
             needs["robot"] += chips["robot"].more((room - sum(needs.values()) - len(needs) * spacing) // 2)
         for name in BRIEF:
             chips[name].be_brief(name in brief)
+        self._was_brief = frozenset(brief)
         return needs
 
     def _whole_name(self, needs: dict[str, int], brief: set[str], room: int) -> None:

@@ -14,7 +14,7 @@ from server_gui.views.cloud.jobs_table import JobsTable
 from server_gui.views.models.judges import Judges
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text, set_tone
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import bring_into_sight
 
 ABOUT: Final = (
@@ -84,7 +84,10 @@ class TrainForm(Card):
         set_text(self.said, said)
         set_tone(self.said, "" if is_fine else "warn")
         is_reached = self._models.reach.problem is None
-        self.begin.setEnabled(not self._models.is_training and is_reached and lessons is not None)
+        nobody = None if lessons is None else lessons.judges(self.judges.chosen).problem
+        can_begin = not self._models.is_training and is_reached and lessons is not None and not nobody
+        self.begin.setEnabled(can_begin)
+        set_tip(self.begin, nobody or "")
 
     def _begin(self) -> None:
         task, robot = str(self.task.currentData()), str(self.robot.currentData())

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtGui import QAction, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -250,7 +250,7 @@ class ParametersPanel(QWidget):
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self.review_button = QPushButton("Review …")
         self.review_button.setObjectName("primary")
-        self.review_button.setShortcut("Ctrl+Return")
+        QShortcut(QKeySequence("Ctrl+Return"), self, self.review_button.click)  # its own goes with its text
         self.undo.setShortcut("Ctrl+Z")
         self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
         self._compare.setToolTip(

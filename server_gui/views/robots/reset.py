@@ -78,8 +78,11 @@ def _ask_again(parent: QWidget, station: Station, why: str, watched: Sequence[Wa
     def again() -> None:
         ask_clear(parent, station, watched)
 
+    def is_moot() -> bool:
+        return station.is_live and not any(alarm.kind is Kind.FAULT for alarm in station.alarms.each)
+
     title = f"NOT cleared: the fault of {station.title}"
-    ask(parent, title, f"{why}.", "Clear fault again …", again, watched=watched)
+    ask(parent, title, f"{why}.", "Clear fault again …", again, watched=watched, is_moot=is_moot)
 
 
 def _asked(

@@ -7,7 +7,7 @@ import pytest
 
 from gateway.client import ClockOffset
 from gateway.wire.stop import Stopped
-from server_gui.core.tuning.stop import StopProgress, StopState, is_off
+from server_gui.core.tuning.stop import Proof, StopProgress, StopState, is_off
 
 JOINTS = ("left_knee", "right_knee")
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -324,3 +324,27 @@ def test_the_journals_time_is_told_by_our_calendar_and_never_later_than_now() ->
     other.read([written(7, "stop", utc_ns=now_ns + 3600 * 10**9)])
     assert other.since_s is not None
     assert other.since_s <= time.time()
+
+
+def test_proofs_of_a_stop_that_is_over_are_not_those_of_the_next_one() -> None:
+    """Another one's stop was "already off" at every drive, which had been enabled."""
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=0), ALL, at_ns=90_000_000)
+    stopping.show([20_000_000], {"left_knee": ["quick stop active"]}, 0)
+    stopping.read([written(8, "stop")])
+    stopping.was_reset(held=False)
+    assert stopping.proofs, "how it was stands there until drives are enabled"
+    stopping.read([written(9, "stop", reason="fell")])
+    assert (stopping.held, stopping.proofs) == (True, {})
+    stopping.was_reset(held=False)
+    stopping.proofs = {"left_knee": Proof(20.0, "quick stop active")}
+    stopping.goes_on()
+    assert (stopping.was_ended, stopping.proofs) == (False, {})
+
+
+def test_what_a_held_stop_has_shown_stays_while_a_drive_is_enabled_again() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(at_ns=0), ALL, at_ns=90_000_000)
+    stopping.show([20_000_000], {"left_knee": ["quick stop active"]}, 0)
+    stopping.goes_on()
+    assert stopping.proofs

@@ -64,8 +64,8 @@ def test_where_only_a_controller_is_silent_the_drives_are_said_to_be_off_and_it_
     (one,) = bench.station.alarms.active
     said = "all 6 drives are off, the gait controller did not answer: it may enable them again"
     assert one.alarm.line == f"STOP NOT CONFIRMED: {said}"
-    assert one.alarm.check.startswith("keep the hardware stop at hand, check gait")
-    assert remedy(bench.station.robot, bench.station.stopping)[0] == "keep the hardware stop at hand"
+    assert one.alarm.check.startswith("STOP again, keep the hardware stop at hand, check gait")
+    assert remedy(bench.station.robot, bench.station.stopping)[0] == "STOP again"
     bench.station.take([states(4.0)])
     assert bench.station.mark.word == "STILL MOVING"
     bench.station.stop("again")
