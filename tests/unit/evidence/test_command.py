@@ -51,7 +51,7 @@ def test_one_edit_is_shown_with_every_metric(config: str, capsys: pytest.Capture
     assert main(["show", told().edit.id[:6], "--config", config]) == 0
     text = capsys.readouterr().out
     assert "recording 20261121T1530" in text
-    assert "worse: 49 gait cycles before, 48 after" in text
+    assert "worse: 48 gait cycles with it, 49 before it" in text
     row = next(line for line in text.splitlines() if "tracking error RMS" in line)
     assert row.split()[-1] == "rad"
     assert "+19.2 %  +17.5 to +20.9 %" in row
