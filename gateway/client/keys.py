@@ -62,7 +62,7 @@ def pin_of(address: Address) -> str | None:
         which = f"{address.called} ({address})" if address.called else str(address)
         other = "" if address.called else f"use the address under which it stands in {server_file()}, or "
         raise NotPaired(
-            f"{which} is not paired, and to another computer nothing is said in plain: {other}pair it (gwrms "
+            f"{which} is not paired, and another computer is only spoken to encrypted: {other}pair it (gwrms "
             "keys pair there, then gwrms pair here)"
         )
     return pin

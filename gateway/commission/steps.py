@@ -19,9 +19,8 @@ from gateway.commission.sensors import SerialBench, sensors
 from gateway.config.robot import NAME
 
 BEGIN = (
-    "The joints are moved by hand, without power. What is written to a drive is asked for first. Nothing is "
-    "enabled here but by homing, where you want it and type its phrase. Ctrl-C interrupts; the same command "
-    "goes on from there."
+    "The joints are moved by hand, without power. What is written to a drive is asked for first. Only homing "
+    "enables a drive, where you want it and type its phrase. An interrupted dialogue goes on where it was."
 )
 
 

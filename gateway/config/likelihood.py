@@ -79,8 +79,8 @@ def _about_controller(config: RobotConfig) -> Iterator[Finding]:
     commanded = config.gateway.role is Role.OBSERVER and config.joint
     if commanded and not config.stop.controller:
         text = (
-            "a stop tells the drives only, whatever commands them keeps running: name that in [[stop.controller]], "
-            "with component, object and the value that stops it"
+            "a stop tells the drives only, whatever commands them keeps running: name that in "
+            "[[stop.controller]], with component, object and the value that stops it"
         )
         yield warning("[stop]", "controller", text)
 

@@ -371,7 +371,7 @@ def test_a_copy_that_has_learned_from_the_wearer_is_told_with_since_when_and_how
         assert page.learned.isVisible() is bool(said)
     bench.station.take_prediction(serving)
     page._show_learned()
-    assert "window, Overview: Take back" in page.learned.text()
+    assert "“Take back” in the window" in page.learned.text()
     destroy(page)
 
 

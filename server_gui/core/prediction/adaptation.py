@@ -190,9 +190,9 @@ class Adapting:
         worth = "" if self.tried is None else f" ({self.tried.text})"
         match self.state:
             case AdaptationState.SERVING:
-                return f"{whom}: serves{since}{worth}; window, Overview: Take back"
+                return f"{whom}: serves{since}{worth}; “Take back” in the window"
             case AdaptationState.OFFERED:
-                return f"{whom}: offered{since}{worth}, does not serve; window, Overview: Use it"
+                return f"{whom}: offered{since}{worth}, does not serve; “Use it” in the window"
             case AdaptationState.TRYING:
                 return f"{whom}: tried{since} beside the general model, does not serve"
             case _:

@@ -30,8 +30,8 @@ MOVED: Final = ("Metric", "Word", "Before", "After", "Difference", "95 % interva
 DIFFERENT: Final = (Word.WORSE, Word.BETTER, Word.CHANGED)
 TONES: Final = {Word.WORSE: "bad", Word.BETTER: "good"}
 NOT_THE_CAUSE: Final = (
-    "Moved with it, which is not because of it: two recordings differ in more than anybody has noted. "
-    "A trial of one change on one day shows what it does."
+    "This moved at the same time, perhaps for another reason: two recordings differ in more than anybody has "
+    "noted. A trial of one change on one day shows what it does."
 )
 
 

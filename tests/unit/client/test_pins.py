@@ -124,7 +124,7 @@ def test_to_another_computer_nothing_is_said_in_plain(
     """Nor under another name of a robot that is paired: whoever answers there could be anybody."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     pin("exo", Address("192.0.2.8", 7420, "a" * 64))
-    with pytest.raises(NotPaired, match="nothing is said in plain"):
+    with pytest.raises(NotPaired, match="only spoken to encrypted"):
         pin_of(Address(host, 7420))
     assert [pin_of(Address(here, 7420)) for here in ("127.0.0.1", "localhost", "::1")] == [None] * 3
 

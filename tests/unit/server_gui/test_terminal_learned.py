@@ -10,7 +10,7 @@ from server_gui.terminal.adapted_models import Learned
 from tests.support.terminal_robot import a_station, screen
 from tests.support.waiting import until
 
-TOLD = "learned from P01: serves since 14:32 (3.4 → 2.1 %); window, Overview: Take back"
+TOLD = "learned from P01: serves since 14:32 (3.4 → 2.1 %); “Take back” in the window"
 
 
 def report(name: str, address: str, calls_itself: str | None) -> bytes:
