@@ -104,7 +104,8 @@ class Question(QDialog):
 
     def _fit(self, wide: int) -> QSize:
         """Fit it around words of at least this width, and return its size."""
-        self.words.setMinimumWidth(wide)
+        self.words.setMinimumSize(wide, self.words.heightForWidth(wide))
+        self._column.activate()
         self.adjustSize()
         return self.size()
 

@@ -207,3 +207,19 @@ def test_where_a_drive_is_not_known_the_chip_says_what_the_others_do(around: Aro
     bench.draw(around)
     words = around.header._chips["drives"]._words
     assert (words.main, words.parts[0]) == ("1 of 6 drives not known", "5 off")
+
+
+def test_a_chip_does_not_change_its_form_with_each_second(header: Header, bench: Bench) -> None:
+    """The button that ends a recording came and went under the pointer."""
+    bench.station.take([telemetry([time.monotonic_ns()], {"left_knee.position": [0.1]}), looked()])
+    forms: dict[int, set[bool]] = {}
+    for width in range(900, 1500, 4):
+        header.resize(width, header.height())
+        for clock in ("4:47", "4:48", "14:50"):
+            said = Said(Tone.GOOD, f"Recording · {clock} 100 rows/s", "", "REC", "")
+            header.recording.say(_words(bench.desk.recording, said, None))
+            header._fit()
+            forms.setdefault(width, set()).add(header.recording._is_brief)
+            if len(forms[width]) > 1 and not header.recording._is_brief:
+                raise AssertionError(f"at {width} px it came back with the next second")
+    assert {True, False} <= set().union(*forms.values()), "both forms were seen"

@@ -8,8 +8,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import Stopped
-from server_gui.views.confirmation import LOOK_MS, Question
+from server_gui.views.confirmation import LOOK_MS, Question, ask
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.recording_chip import ask_name
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.free_place import free_place
 from server_gui.views.widgets.stop_button import StopButton
@@ -64,17 +65,17 @@ def test_stops_their_results_and_the_joints_stay_in_sight_beside_the_question_of
     bench.station.stop("test")
     bench.first.answer(HELD)
     joints = window.tabs.overview._joints
-    for dock, ask in itertools.product(window.docks[:2], (window.header.reset, window.alarms.cleared)):
+    for dock, asked in itertools.product(window.docks[:2], (window.header.reset, window.alarms.cleared)):
         window.bring(dock)
         for _ in range(3):
             bench.draw(window)
             rules.settle()
-        ask.emit(bench.station)
+        asked.emit(bench.station)
         question = next(one for one in window.findChildren(Question) if one.isVisible())
         results = [window.header, window.alarms, *window.robots.cards]
         assert covered(question, [*window.findChildren(StopButton), *results]) == []
         assert window.geometry().contains(question.geometry())
-        is_long = ask is window.alarms.cleared and scale > 1.0  # there is no room beside all of it
+        is_long = asked is window.alarms.cleared and scale > 1.0  # there is no room beside all of it
         assert is_long or covered(question, [joints]) == []
         destroy(question)
 
@@ -156,3 +157,29 @@ def test_a_question_leaves_a_stop_under_which_the_window_is_resized(
     question.move(on_screen(stop).topLeft())
     window.resize(1024, 700)
     wait(lambda: covered(question, window.findChildren(StopButton)) == [], "left every STOP in sight")
+
+
+def test_a_question_about_what_is_over_goes_by_itself(window: MainWindow, bench: Bench) -> None:
+    """A fault had long been cleared, and a card said still that it could not be."""
+    over = list[bool]()
+    question = ask(
+        window, "NOT cleared", "left_knee stays in fault", "Again", list, is_moot=lambda: bool(over)
+    )
+    QTest.qWait(3 * LOOK_MS)
+    assert question.isVisible()
+    over.append(True)
+    wait(lambda: not window.findChildren(Question), "went")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_a_question_with_two_fields_has_room_for_all_of_its_words(
+    window: MainWindow, theme: Theme, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(1280, 742)
+    ask_name(window, lambda _name, _wearer: None)
+    (question,) = window.findChildren(Question)
+    QTest.qWait(LOOK_MS)
+    needed = question.words.heightForWidth(question.words.width())
+    assert question.words.height() >= needed
+    assert question.act.geometry().bottom() < question.height()

@@ -355,3 +355,19 @@ def test_a_channel_is_listed_in_the_unit_that_it_is_drawn_in(signals: Signals) -
     titles = {str(item.text(0)) for item in signals.channels.items}
     assert {"position  °", "torque  N·m", "cell 0  kPa"} <= titles
     assert {plot.unit.symbol for plot in signals.plots} <= {"°", "N", "N·m", "kPa"}
+
+
+def test_what_stands_still_stays_also_once_its_rows_are_no_longer_kept(
+    signals: Signals, bench: Bench
+) -> None:
+    """Eleven minutes later four plots had no data."""
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    rows_until(bench, newest_ns + 6_000_000_000)
+    signals.refresh()
+    rows = len(signals.scene.times(100.0))
+    rows_until(bench, newest_ns + 660_000_000_000)
+    signals._build()
+    signals.refresh()
+    assert len(signals.scene.times(100.0)) == rows
