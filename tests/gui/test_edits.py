@@ -303,7 +303,7 @@ def test_the_legend_speaks_of_no_curve_that_is_not_drawn(bench: Bench, parts: Pa
     one = worse()
     for before, after, words in (
         (1, 1, "blue: the new value · grey: the old value ·"),
-        (0, 1, "blue: the new value · no stride with the old value is known"),
+        (0, 1, "blue: the new value · too few strides with the old value to draw"),
     ):
         curves = tuple(
             Curves(each.channel, each.before if before else None, each.after if after else None)

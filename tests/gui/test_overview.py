@@ -477,7 +477,8 @@ def test_the_first_line_leads_with_the_worst_of_the_robot_as_its_card_does(
     overview.refresh()
     icon = overview.now.drives._icon._mark
     assert (icon.shape, icon.colour) == (bench.station.mark.shape, bench.station.mark.colour)
-    assert overview.now.drives.detail.text().endswith("left insole lost")
+    assert overview.now.drives.main.text() == "Left insole lost"
+    assert overview.now.drives.detail.text().endswith("6 of 6 enabled")
 
 
 def test_a_joint_beyond_its_ends_says_so_in_its_row(

@@ -163,7 +163,7 @@ def test_a_question_about_what_is_over_goes_by_itself(window: MainWindow, bench:
     """A fault had long been cleared, and a card said still that it could not be."""
     over = list[bool]()
     question = ask(
-        window, "NOT cleared", "left_knee stays in fault", "Again", list, is_moot=lambda: bool(over)
+        window, "NOT cleared", "left_knee stays in fault", "Again", lambda: None, is_moot=lambda: bool(over)
     )
     QTest.qWait(3 * LOOK_MS)
     assert question.isVisible()

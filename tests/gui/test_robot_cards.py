@@ -185,7 +185,7 @@ def test_a_robot_that_is_enabled_is_not_removed_without_saying_so(around: Around
     asked.reject()
     bench.desk.remove(bench.station)
     newest = bench.desk.news.items[0]
-    assert "removed while its drives were enabled: its STOP is gone" in newest.text
+    assert "removed while its drives were enabled; this window cannot stop it any more" in newest.text
 
 
 @pytest.mark.parametrize("ends", ["acknowledged", "it is added again"])
@@ -196,7 +196,10 @@ def test_one_that_was_removed_while_enabled_stays_named_until_somebody_has_seen_
     bench.desk.remove(bench.station)
     settle(around, bench)
     strip = around.alarms
-    assert strip.headline.text() == "removed: exo-01: while its drives were enabled: its STOP is gone"
+    assert (
+        strip.headline.text()
+        == "removed: exo-01: while its drives were enabled; this window cannot stop it any more"
+    )
     assert "use the hardware stop" in strip.details.text()
     assert strip.property("tone") == "warn"
     other = bench.add("exo-02", 7421)

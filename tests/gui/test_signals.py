@@ -214,7 +214,7 @@ def test_the_seconds_after_an_instant_are_shown_as_they_come(signals: Signals, b
     assert newest_ns is not None
     signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
     signals.refresh()
-    assert "the 5 s after it are added as they come" in signals.said.text()
+    assert "Paused, up to 5 s more come" in signals.said.text()
     rows_until(bench, newest_ns + 2_000_000_000)
     signals.refresh()
     _left, right = signals.plots[0].plot.window_s

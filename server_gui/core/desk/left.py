@@ -12,7 +12,7 @@ from server_gui.core.alarms.unconfirmed import unstopped
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 
-GONE: Final = "its STOP is gone"
+GONE: Final = "this window cannot stop it any more"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,4 +47,4 @@ def left_alarm(station: Station) -> Alarm | None:
         how = f"while the state of {listed(unknown)} was not known"
     else:
         return None
-    return Alarm(kind, station.address, f"{how}: {GONE}", station.title, check=check_of(kind))
+    return Alarm(kind, station.address, f"{how}; {GONE}", station.title, check=check_of(kind))

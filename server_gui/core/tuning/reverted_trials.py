@@ -23,6 +23,11 @@ class RevertedTrials:
         self._tell = tell
         self._awaited: tuple[Mapping[str, Number], int] | None = None
 
+    @property
+    def awaited(self) -> frozenset[str]:
+        """The parameters whose values are read again: what is known of them is the trial's."""
+        return frozenset() if self._awaited is None else frozenset(self._awaited[0])
+
     def began(self, before: Mapping[str, Number]) -> None:
         """Take the robot's report that these are in force again."""
         self._awaited = before, time.monotonic_ns()

@@ -333,7 +333,7 @@ def _sides(told: EditEvidence) -> str:
     """Return what is drawn in which colour."""
     old = f"grey: the old value{BACK if told.evidence.cycles_back else ''}"
     if not any(one.before for one in told.curves):
-        old = "no stride with the old value is known"
+        old = "too few strides with the old value to draw"
     new = "blue: the new value" if any(one.after for one in told.curves) else ""
     return " · ".join(filter(None, (new, old)))
 

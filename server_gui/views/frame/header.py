@@ -306,8 +306,9 @@ def _linked(station: Station) -> tuple[Mark, str, tuple[str, ...]]:
         return Mark("cross", "bad"), main, ("trying again", link.problem or link.state.value)
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
-    again = (f"linked {link.links} times",) if link.links > 1 else ()
-    parts = (f"{lost} lost on the link", f"round trip {trip}", *again)
+    said = f"{lost} lost" if link.links > 1 else f"{lost} lost on the link"  # what a link lost is not counted
+    again = (f"linked {link.links} times, {said}",) if link.links > 1 else (said,)
+    parts = (*again, f"round trip {trip}")
     if robot.age_s() is None:
         return Mark("ring", "old"), "Linked, no data yet", parts
     if robot.is_stale():

@@ -8,6 +8,8 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from gateway.units import Units, rounded
+from server_gui.core.alarms.drive_states import unknown_joints
+from server_gui.core.alarms.robot_alarms import any_enabled
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.alarms.unconfirmed import enabled_mark, remedy, unstopped
 from server_gui.core.desk.desk import Desk
@@ -244,15 +246,21 @@ def _drives(station: Station, units: Units) -> tuple[Mark, tuple[str, ...], tupl
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
     if not station.is_live:
         return TEXTS[Kind.STOPPED].mark, _last_since(station), _last_details(station)
-    if station.stopping.held and mark.colour == "dim":  # off, and held so
+    is_off = not any_enabled(station.robot) and not unknown_joints(station.robot)
+    if station.stopping.held and is_off:
         details = (*_proven(station), f"{mark.word} · {count}", count)
         return TEXTS[Kind.STOPPED].mark, _since(station), details
     said = dict.fromkeys((mark.word.capitalize(), SHORTER.get(mark.word, mark.word).capitalize()))
     worst = station.mark
     if mark.colour == "good" and worst.colour in ("warn", "bad"):  # as its card says
-        led = Mark(worst.shape, worst.colour, mark.word)
-        return led, tuple(said), (f"{count} · {worst.word}", worst.word, count)
+        brief = SHORTER.get(mark.word, mark.word)
+        return worst, (capitalised(worst.word),), (f"{mark.word} · {count}", f"{brief} · {count}", count)
     return mark, tuple(said), (*_warmest(station, units, count), count)
+
+
+def capitalised(word: str) -> str:
+    """Return it as a title; what is in capitals already stays so."""
+    return word[:1].upper() + word[1:]
 
 
 def _warmest(station: Station, units: Units, count: str) -> tuple[str, ...]:

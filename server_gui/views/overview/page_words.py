@@ -49,8 +49,8 @@ def age_texts(station: Station) -> tuple[str, ...]:
     """Return how old the values are."""
     if not station.is_live:
         return old_text(station)
-    then = "then " if station.robot.is_recording else ""
-    return (f"age {then}{age_text(station.robot.age_s())}",)
+    age = age_text(station.robot.age_s())
+    return (f"{age} old then",) if station.robot.is_recording else (f"age {age}",)
 
 
 def angle_texts(pose: Pose, unit: Unit) -> list[str]:

@@ -114,7 +114,8 @@ class Detail(Card):
             return
         unit = unit_of(info.name, info.unit, self._desk.shown.units)
         held, staged = station.robot.parameters.get(info.name), station.edits.staged.get(info.name)
-        current = None if held is None else held.value
+        is_read = info.name not in station.reverted.awaited
+        current = None if held is None or not is_read else held.value
         value = staged.value if staged is not None else current
         self.set_title(info.name)
         set_text(self._unit, unit.symbol)

@@ -259,6 +259,7 @@ class ParameterTree(QTreeView):
         unit = unit_of(name, info.unit, self._desk.shown.units)
         staged = station.edits.staged.get(name)
         value = None if held is None else held.value
+        is_read = name not in station.reverted.awaited
         elsewhere = staged is not None and staged.base != value
         on_trial = station.writing.trial is not None and name in station.writing.trial.values
         refused = None if staged is None else refusal(staged.value, value, info, unit)
@@ -268,7 +269,7 @@ class ParameterTree(QTreeView):
             or (held.problem if held is not None else None)
             or station.writing.rows.get(name)
         )
-        _set(items[ROBOT], "–" if value is None else brief(unit, value))
+        _set(items[ROBOT], "…" if not is_read else "–" if value is None else brief(unit, value))
         _set(items[NEW], "" if staged is None else unit.editable(staged.value))
         said = next(
             word

@@ -267,7 +267,7 @@ class RobotsPanel(QWidget):
             does = "walks" if station.processing.derived().gait.walking else "has enabled drives"
             goes = f"{station.title} {does}: its STOP leaves this window.\n\n"
         elif (left := left_alarm(station)) is not None:
-            was = left.what.partition(":")[0].removeprefix("while ")
+            was = left.what.partition(";")[0].removeprefix("while ")
             goes = f"When last seen {was}; from here it could not be stopped any more.\n\n"
         text = (
             f"{goes}Remove {station.title} ({station.address}) from this window?\n\n"

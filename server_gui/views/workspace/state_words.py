@@ -19,7 +19,7 @@ def state_words(
     more = len([name for name in chosen if name not in scene.workspace.curves])
     many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
     if jump is not None and jump.comes:
-        return f"Paused; the {jump.around_s:.0f} s after it are added as they come{many}"
+        return f"Paused, up to {jump.around_s:.0f} s more come{many}"
     if scene.frozen is not None:
         goes_on = "" if station.robot.is_recording else ", data continue"
         return f"{'Kept by the trigger' if scene.is_kept else 'Paused'}{goes_on}{many}"

@@ -89,8 +89,10 @@ def test_what_is_not_known_to_be_off_is_named_and_how_it_was(
     alarms = [one.alarm for one in bench.desk.alarms.active]
     assert [one.kind for one in alarms] == ([] if kind is None else [kind])
     if kind is not None:
-        assert alarms[0].line == f"{kind.value}: exo-01: {words}: its STOP is gone"
-    assert bench.desk.news.items[0].text == (f"removed {words}: its STOP is gone" if words else "removed")
+        assert alarms[0].line == f"{kind.value}: exo-01: {words}; this window cannot stop it any more"
+    assert bench.desk.news.items[0].text == (
+        f"removed {words}; this window cannot stop it any more" if words else "removed"
+    )
 
 
 def test_one_of_two_that_was_left_is_acknowledged_alone(bench: Bench) -> None:
