@@ -1,6 +1,7 @@
 """What has room in the strip of alarms, and what goes first where there is little."""
 
 import time
+from collections import defaultdict
 from types import SimpleNamespace
 from typing import cast
 
@@ -8,7 +9,7 @@ import pytest
 
 from gateway.wire.stop import Stopped
 from server_gui.core.commissioning.alarm import unstopped
-from server_gui.core.commissioning.commissioning import Commissioning
+from server_gui.core.commissioning.commissioning import Commissioning, Unconfirmed
 from server_gui.core.commissioning.stages import LOOKS, Stage
 from server_gui.views.alarms.words import REMEDY
 from server_gui.views.frame.main_window import MainWindow
@@ -59,10 +60,15 @@ def test_what_to_check_has_room_before_the_register_of_a_code(
     assert REMEDY in said
 
 
+UNCONFIRMED = defaultdict(
+    dict, {Stage.NOT_CONFIRMED: {"exo-09.toml": Unconfirmed("exo-09", "knee", time.time())}}
+)
+
+
 def commissioned(stage: Stage) -> Commissioning:
     """A robot at this stage."""
     known = SimpleNamespace(
-        name="exo-09", look_of=LOOKS[stage], since_s=time.time(), stage=stage, problem="knee"
+        name="exo-09", look_of=LOOKS[stage], since_s=time.time(), unconfirmed=UNCONFIRMED[stage]
     )
     return cast("Commissioning", known)
 
@@ -72,14 +78,14 @@ def test_a_commissioned_robot_that_has_not_stopped_comes_before_another_ones_war
 ) -> None:
     """A yellow line of the other one hid it."""
     bench.station.take([walking(300), looked(state="stale")])
-    bench.desk.commissioned_alarm = lambda: unstopped(commissioned(Stage.NOT_CONFIRMED))
+    bench.desk.commissioned_alarms = lambda: unstopped(commissioned(Stage.NOT_CONFIRMED))
     settle(around, bench)
     assert around.alarms.headline.text() == "STOP NOT CONFIRMED: exo-09: knee"
     assert around.alarms.property("tone") == "urgent"
     around.alarms.acknowledge(around.alarms.told[0])
     settle(around, bench)
     assert any("exo-09" in text and "acknowledged" in text for text in around.alarms.texts)
-    bench.desk.commissioned_alarm = lambda: unstopped(commissioned(Stage.STOPPED))
+    bench.desk.commissioned_alarms = lambda: unstopped(commissioned(Stage.STOPPED))
     settle(around, bench)
     assert not any("exo-09" in text for text in around.alarms.texts)
 

@@ -188,3 +188,18 @@ def test_few_joints_alone_have_rows_no_higher_than_the_eye_follows(
     rules.settle()
     assert [page._table.rowHeight(row) for row in range(2)] == [theme.px(44)] * 2
     assert page._table.geometry().top() < theme.px(60), "the rest is below"
+
+
+def test_a_state_that_the_window_does_not_know_breaks_no_page(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    """A gateway newer than the window may tell one."""
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    now = looked()
+    new: QualityInfo = {"state": "hibernating", "age_ms": 4.0, "problem": "asleep"}
+    quality = {**now.quality.quality, "trunk": new, "left_knee": new}
+    wrong = dataclasses.replace(now, quality=msgspec.structs.replace(now.quality, quality=quality))
+    bench.station.take([walking(300), wrong])
+    settle(window, bench)
+    assert window.tabs.overview.sections.isVisible()

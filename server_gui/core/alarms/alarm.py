@@ -9,6 +9,7 @@ from typing import Final
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, UNSTOPPED, Kind
 
+NEWER_S: Final = 1.0  # a stop that is so much later is another one, to be read again
 ASIDE: Final = re.compile(r" \([^()]*\)$")
 GRAVER: Final = {Kind.PART_STALE: "component silent", Kind.STALLED: "computer halted"}
 MORE: Final = " …"  # there is more, which stands in the list
@@ -176,7 +177,8 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)
         return Active(alarm, since_s, at_ns)
     if alarm.kind in _OF_STOP and alarm.since_s is not None:
-        return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s)  # as the line above it says
+        is_read = before.is_acknowledged and alarm.since_s <= before.since_s + NEWER_S
+        return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, is_acknowledged=is_read)
     if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
     return dataclasses.replace(before, alarm=alarm)

@@ -16,6 +16,7 @@ from server_gui.core.follow.robot import Robot
 
 LEANS: Final = math.radians(60.0)  # who stands up from a chair leans by some 45°
 LEANING: Final = {"tilt_forward": ("forward", "backward"), "tilt_side": ("to a side", "to a side")}
+TRUNK: Final = "trunk"
 HOT: Final = 85.0  # °C: few drives are rated for more, and their electronics age fast
 SLACK: Final = math.radians(2.0)  # by which a joint may overshoot an end
 HELD_S: Final = 5.0  # what swings about its limit is one alarm, not one a stride
@@ -42,11 +43,18 @@ class Beyond:
     def __init__(self) -> None:
         self._seen: dict[Key, Seen] = {}
 
-    def look(self, robot: Robot) -> tuple[FoundBeyond, ...]:
-        """Return what is beyond its limit now; what was last known so stays while nothing is known."""
+    def look(self, robot: Robot, *, is_off: bool = False) -> tuple[FoundBeyond, ...]:
+        """Return what is beyond its limit now; what was last known so stays while nothing is known.
+
+        A robot with every drive off (`is_off`) may be laid down; one that has fallen before has still.
+        """
         if robot.is_stale():
             return () if robot.is_recording else self._of(robot)
-        found: dict[Key, Seen] = {(one.kind, one.component): (one, None) for one in _found(robot)}
+        found: dict[Key, Seen] = {
+            key: (one, None)
+            for one in _found(robot)
+            if (key := (one.kind, one.component)) in self._seen or not (is_off and one.kind is Kind.FALLEN)
+        }
         if not robot.is_recording:  # whose instant goes to and fro
             now_s = robot.now_s()
             kept = {key: _fading(robot, now_s, *seen) for key, seen in self._seen.items()}
@@ -65,7 +73,8 @@ def _fading(robot: Robot, now_s: float, one: FoundBeyond, within_s: float | None
     if not any(info.name == channel for info in described):
         return None
     value = robot.values.get(channel)
-    if value is None or not math.isfinite(value):
+    is_bounded = one.kind is not Kind.BEYOND or position_ends(robot, one.component, robot.parameters)
+    if value is None or not math.isfinite(value) or not is_bounded:
         return replace(one, is_now=False), None
     began_s = now_s if within_s is None or now_s < within_s else within_s
     return None if now_s - began_s >= HELD_S else (replace(one, is_now=True), began_s)
@@ -77,8 +86,8 @@ def is_hot(temperature: float | None) -> bool:
 
 
 def _found(robot: Robot) -> Iterator[FoundBeyond]:
-    for name in robot.names("imu"):
-        yield from _leaning(robot, name)
+    if TRUNK in robot.names("imu"):  # a thigh leans as far in everybody who sits
+        yield from _leaning(robot, TRUNK)
     for name in robot.names("joint"):
         yield from _beyond_an_end(robot, name)
         yield from _hot(robot, name)

@@ -383,11 +383,9 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
 
 
 def _of_beyond(facts: Facts) -> Iterator[Alarm]:
-    """Yield them; a robot without a wearer that it drives may lie as it is laid."""
+    """Yield them."""
     robot = facts.robot
     for one in facts.beyond:
-        if one.kind is Kind.FALLEN and undriven(robot, facts.stopping) == NONE_ENABLED:
-            continue
         code = robot.values.get(f"{one.component}.error_code") or 0
         if one.kind is Kind.HOT and _is_in_fault(robot, robot.parts[one.component]) and int(code) >> 12 == 4:
             continue  # its drive says so itself
@@ -416,6 +414,11 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
     if any(word in _IN_FAULT for word in words):
         return IN_FAULT
     return NONE_ENABLED if words and all(map(is_off, words)) else ""
+
+
+def is_idle(robot: Robot, stopping: StopProgress) -> bool:
+    """Return whether every drive is known to be off, by nothing that has happened."""
+    return undriven(robot, stopping) == NONE_ENABLED
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:

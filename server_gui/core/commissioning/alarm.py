@@ -1,20 +1,20 @@
-"""The alarm of a robot that is commissioned here, and has not confirmed its STOP: no list has it."""
+"""The alarms of robots that were commissioned here, and have not confirmed their STOP: no list has them."""
 
 from typing import Final
 
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.stages import Stage
 
 NOT_EVERY: Final = "not every drive has confirmed it"
 
 
-def unstopped(commissioning: Commissioning) -> Alarm | None:
-    """Return it; None where it is not so."""
-    if commissioning.stage is not Stage.NOT_CONFIRMED:
-        return None
-    name = commissioning.name
-    what, check = commissioning.problem or NOT_EVERY, check_of(Kind.NOT_STOPPED)
-    since_s = commissioning.since_s
-    return Alarm(Kind.NOT_STOPPED, f"commissioned {name}", what, name, check=check, since_s=since_s)
+def unstopped(commissioning: Commissioning) -> list[Alarm]:
+    """Return them: also of one that was commissioned before, until its STOP is confirmed."""
+    check = check_of(Kind.NOT_STOPPED)
+    return [
+        Alarm(
+            Kind.NOT_STOPPED, f"commissioned {file}", one.why or NOT_EVERY, one.name, "", check, one.since_s
+        )
+        for file, one in commissioning.unconfirmed.items()
+    ]

@@ -87,6 +87,15 @@ class LogLineKind(Enum):
     NOTED = "■ "
 
 
+@dataclass(frozen=True, slots=True)
+class Unconfirmed:
+    """A STOP of a robot that was commissioned, and has not confirmed it since (UTC)."""
+
+    name: str
+    why: str
+    since_s: float
+
+
 class Commissioning:
     """`talk` starts a command; `look` takes what has come, some times a second."""
 
@@ -95,6 +104,7 @@ class Commissioning:
         self.wish: CommissioningRequest | None = None
         self._stage = Stage.NOT_STARTED
         self.since_s = time.time()  # UTC: of the stage
+        self.unconfirmed: dict[str, Unconfirmed] = {}  # by file, whatever is commissioned after it
         self.question: Message | None = None
         self.steps: tuple[StepMessage, ...] = ()
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
@@ -131,6 +141,10 @@ class Commissioning:
     def stage(self, stage: Stage) -> None:
         if stage is not self._stage:
             self._stage, self.since_s = stage, time.time()
+        if self.wish is not None and stage is Stage.NOT_CONFIRMED:
+            self.unconfirmed[self.wish.file] = Unconfirmed(self.name, self.problem, self.since_s)
+        elif self.wish is not None and stage is Stage.STOPPED:
+            self.unconfirmed.pop(self.wish.file, None)
 
     @property
     def look_of(self) -> StageView:

@@ -54,7 +54,7 @@ class Desk:
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
-        self.commissioned_alarm: Callable[[], Alarm | None] = lambda: None
+        self.commissioned_alarms: Callable[[], Sequence[Alarm]] = lambda: ()
         self.commissions: Callable[[], bool] = lambda: False  # whether a robot is commissioned in this window
         self.on_select: list[Callable[[Station | None], None]] = []
 
@@ -134,9 +134,8 @@ class Desk:
         that is commissioned.
         """
         self._left = {key: one for key, one in self._left.items() if not one.is_seen_in(self.stations)}
-        commissioned = self.commissioned_alarm()
         left = [one.alarm for one in self._left.values()]
-        self._alarms.look([*left, *([] if commissioned is None else [commissioned])], time.time())
+        self._alarms.look([*left, *self.commissioned_alarms()], time.time())
         return self._alarms
 
     def select(self, station: Station | None) -> None:

@@ -88,7 +88,7 @@ class Flags:
         spoken = component.replace("_", " ")
         near = self.between(at_ns - NOTICED_NS, at_ns + NOTICED_NS)
         known = [one.at_ns for one in near if one.kind is FlagKind.FAULT and spoken in _names(one.text)]
-        return min(known, key=lambda found: abs(found - at_ns), default=at_ns)
+        return min(known, key=lambda found: (found > at_ns, abs(found - at_ns)), default=at_ns)
 
     def clear(self) -> None:
         """Forget them: the clock has begun anew."""

@@ -23,7 +23,7 @@ from server_gui.core.alarms.beyond import Beyond
 from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.robot_alarms import Facts, any_enabled, go_on
+from server_gui.core.alarms.robot_alarms import Facts, any_enabled, go_on, is_idle
 from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import worst
@@ -107,14 +107,12 @@ class Station:
         self.audit = Audit()
         self.flash = Flash(self.audit)
         self.objects = Objects(commands, deliver)
-        self._commands = commands
-        self._deliver = deliver
+        self._commands, self._deliver = commands, deliver
         self.news = news
         self._alarms = Alarms()
         self._judged: FrameTime | None = None  # by which the alarms were looked for, since anything has come
         self._watch = RobotNews(self.tell)
-        self._watched_ns = 0
-        self._happened = FlagWatch()
+        self._watched_ns, self._happened = 0, FlagWatch()
         self._stalls, self._beyond = Stalls(), Beyond()
         self._beyond_news = BeyondNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
@@ -184,7 +182,7 @@ class Station:
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         is_busy, entries = self.is_overloaded(), self.audit.entries
         known = (self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
-        facts = Facts(*known, self._beyond.look(self.robot))
+        facts = Facts(*known, self._beyond.look(self.robot, is_off=is_idle(self.robot, self.stopping)))
         if (self.stopping.was_ended or self.stopping.proofs) and any_enabled(self.robot) and self.is_live:
             self.stopping.goes_on()
         self._alarms.look(

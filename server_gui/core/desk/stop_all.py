@@ -170,7 +170,8 @@ def _result(robots: Sequence[Standing], drives: str) -> StopAllResult:
     why = [f"{one.title} {one.why}" for one in doubtful]
     mark = SENT if waiting else STOPPED
     mark = Mark("square", "bad", mark.word) if by_how[How.NOT_STOPPED] else mark
-    said = Counter(one.brief for one in doubtful)
+    worst_first = sorted(doubtful, key=lambda one: one.how is not How.NOT_STOPPED)
+    said = Counter(one.brief for one in worst_first)
     least = "; ".join((*(f"{number} {word}" for word, number in said.items()), count))  # whatever their names
     wordings = ("; ".join((*parts, *why)), "; ".join((*parts, *brief)), "; ".join((count, *brief)), least)
     return StopAllResult(mark, tuple(dict.fromkeys(f"{mark.word}: {said}" for said in wordings)))

@@ -101,6 +101,8 @@ class StopProgress:
     silent: tuple[str, ...] = ()  # controllers that have not confirmed it, where every drive has
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _sent_s: float | None = None  # UTC: of the latest STOP
+    _stood_s: float | None = None  # UTC: since when one is held that all have confirmed, or another
+    _before_s: float | None = None  # the same, as the latest STOP was sent
     _heard_ns: int = 0  # when one was first known to be held by the robot's word, not by our STOP's answer
     _off: set[str] = field(default_factory=set)  # drives that were not enabled when it was sent
     _confirmed: Set[str] = frozenset()  # drives that have confirmed it
@@ -144,6 +146,7 @@ class StopProgress:
             now_ns = time.monotonic_ns()
             self.at_ns = now_ns if at_ns is None else at_ns
             self._sent_s = time.time() - (now_ns - self.at_ns) / 1e9
+            self._before_s = self._stood_s
             if not self.held or self.since_s is None:
                 self.since_s = self._sent_s
             self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, set(off), clock, boot_id, 0
@@ -173,9 +176,13 @@ class StopProgress:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
-            if self._confirmed - self._off:
-                self.since_s = self._sent_s  # else it has stood since the one that is held
+            self._stand()
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
+
+    def _stand(self) -> None:
+        """Note since when it has stood: since this STOP, or one before that had stopped all of it."""
+        was_so = self._before_s is not None and not self._confirmed - self._off
+        self.since_s = self._stood_s = self._before_s if was_so else self._sent_s
 
     def failed(self, number: int, reason: str) -> None:
         """Note that nobody answered: consider the robot not stopped."""
@@ -191,6 +198,7 @@ class StopProgress:
             self.silent, self._confirmed = (), frozenset()  # they say nothing of the next one
             self.is_outdated = False
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
+            self._stood_s = None
 
     def goes_on(self) -> None:
         """Note that drives are enabled again after a reset: what that stop has shown is history."""
@@ -205,6 +213,7 @@ class StopProgress:
         `is_anew`: its computer has started again since.
         """
         self._hears(held)
+        self._stood_s = self._stood_s if held else None
         if held and not self.held and self.state is StopState.IDLE:
             self.proofs, self.was_ended = {}, False
             self.since_s = None  # the journal, or our own STOP, tells since when
@@ -294,6 +303,7 @@ class StopProgress:
             if drive not in self.proofs:
                 self._prove(drive, stamps_ns, words, offset_ns, self.at_ns)
         if self.state is StopState.CONFIRMED:
+            self._stand()
             self.text = self.timed(f"STOP confirmed by {self.every_drive}")
 
     def _prove(
@@ -402,7 +412,9 @@ class StopProgress:
         if not self.held or not self.reason:
             self.reason = _said(entry)
         if not self.held or self.since_s is None:
-            self.since_s = self._utc_s(entry)
+            self._stood_s = self._utc_s(entry)
+            if self.state is not StopState.NOT_CONFIRMED:  # which is since ours, whoever holds another
+                self.since_s = self._stood_s
         if not self.held and self.state is StopState.IDLE:
             self.proofs = {}  # of a STOP that is over: it is another one that is held
         self._hears(True)

@@ -189,10 +189,10 @@ class Scene:
         cut = {text: column[:end] for text, column in columns.items()}
         self.frozen = Frozen(times[:end], cut, newest_ns, station.rings.source, trigger_ns)
 
-    def keep_more(self) -> None:
+    def keep_more(self, from_s: float = -LEAST_S) -> None:
         """Stand still as before, with the curves that there are now, while their rows are still there.
 
-        Those that were shown stay also after that.
+        Those that were shown stay also after that; in sight is what begins `from_s`, s until the newest.
         """
         kept, station = self.frozen, self._station
         if (
@@ -201,7 +201,7 @@ class Scene:
             and kept.source is station.rings.source
             and len(kept.times)
             and len(rows := station.rings.times(KEPT_S))
-            and rows[0] <= max(float(kept.times[0]), float(kept.times[-1]) - LEAST_S)
+            and rows[0] <= max(float(kept.times[0]), float(kept.times[-1]) + from_s)
         ):
             self.freeze(float(kept.times[-1]), kept.trigger_ns)
 

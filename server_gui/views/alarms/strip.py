@@ -9,7 +9,7 @@ from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import MORE
-from server_gui.core.alarms.texts import UNSTOPPED
+from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
@@ -128,7 +128,9 @@ class AlarmStrip(ClickableFrame):
         station, one = told
         if station is not None and one.alarm.channel is not None and one.at_ns is not None:
             self.list.hide()
-            at_ns = station.flags.instant_of_fault(one.alarm.subject, one.at_ns)
+            is_fault = one.alarm.kind is Kind.FAULT
+            at_ns = one.at_ns
+            at_ns = station.flags.instant_of_fault(one.alarm.subject, at_ns) if is_fault else at_ns
             self.shown.emit(station, one.alarm.channel, at_ns)
 
     def show_resources(self, told: Told) -> None:

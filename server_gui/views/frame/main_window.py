@@ -157,7 +157,7 @@ class MainWindow(QMainWindow):
             desk.commissions = lambda: commissioning.wish is not None
             self.header.commissioned = lambda: commissioning.name if commissioning.runs else ""
             self.alarms.commissioned = lambda: commissioning
-            desk.commissioned_alarm = lambda: unstopped(commissioning)
+            desk.commissioned_alarms = lambda: unstopped(commissioning)
             self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme, commissioning)
         self.setStatusBar(self._bar)

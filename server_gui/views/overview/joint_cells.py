@@ -208,7 +208,8 @@ def _stop(station: Station, joint: str) -> Cell:
         if station.robot.word(f"{joint}.state") == ENABLED:
             return Cell(ENABLED_AGAIN, "dim", None, f"{proof.text}; enabled again since")
         is_past = stopping.state is StopState.IDLE  # it was reset since
-        colour = "dim" if proof.was_so or is_past else "good"
+        is_ours = stopping.state is not StopState.NOT_CONFIRMED or joint in stopping.confirmed
+        colour = "dim" if proof.was_so or is_past or not is_ours else "good"
         tip = f"{proof.text}, which was reset since" if is_past else proof.text
         return Cell(proof.when, colour if station.is_live else "old", None, tip)
     if stopping.state is StopState.IDLE:

@@ -93,10 +93,11 @@ class SectionBar(QFrame):
             return
         everywhere = frozenset.intersection(*self._pages)
         for button, page in zip(self.buttons, self._pages, strict=False):
-            behind = [wrong[one] for one in Section if one in page - everywhere and one in wrong]
+            here = [wrong[one] for one in Section if one in page - everywhere and one in wrong]
+            behind = [(found, mark) for found, mark in here if found]
             names = [name for found, _ in behind for name in found]
-            worst = max((mark for _, mark in behind), key=lambda mark: TONES.index(mark.colour), default=None)
-            tone = "" if worst is None else worst.colour
+            worst = max((mark for _, mark in behind), key=_badness, default=None)
+            tone = "" if worst is None or worst.colour not in TONES else worst.colour
             text = name_of(page)
             if names and worst is not None:
                 which = names[0] if len(names) == 1 else f"{len(names)} not ok"
@@ -104,3 +105,8 @@ class SectionBar(QFrame):
             if button.text() != text:
                 button.setText(text)
             set_tone(button, tone if names else "")
+
+
+def _badness(mark: Mark) -> int:
+    """Return how bad it is, the more the worse; what nobody knows more of is not well either."""
+    return TONES.index(mark.colour) if mark.colour in TONES else 0

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import ROBOT_RESET
-from server_gui.core.alarms.drive_states import listed
+from server_gui.core.alarms.drive_states import listed, unknown_joints
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.texts import Kind
@@ -79,7 +79,8 @@ def _ask_again(parent: QWidget, station: Station, why: str, watched: Sequence[Wa
         ask_clear(parent, station, watched)
 
     def is_moot() -> bool:
-        return station.is_live and not any(alarm.kind is Kind.FAULT for alarm in station.alarms.each)
+        in_fault = any(alarm.kind is Kind.FAULT for alarm in station.alarms.each)
+        return station.is_live and not in_fault and not unknown_joints(station.robot)
 
     title = f"NOT cleared: the fault of {station.title}"
     ask(parent, title, f"{why}.", "Clear fault again …", again, watched=watched, is_moot=is_moot)

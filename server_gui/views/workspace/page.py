@@ -177,7 +177,7 @@ class Signals(QWidget):
         if names:
             self.choose(names)
             bring_into_sight(self.area, first=True)  # below its tools on a small screen
-        self.pause.setChecked(False)  # else it would be what was seen before
+        self._told = ""
         if not self.show_at(at_ns):
             self.pause.setChecked(False)  # nothing else is shown in its place as if it were that
             self._is_gone = True
@@ -256,7 +256,7 @@ class Signals(QWidget):
         self.area.build(self._seconds, self._window if self.plots else None)
         self._choose_by_box(self.box.isChecked())
         self._mark()
-        self.scene.keep_more()
+        self.scene.keep_more(self._window[0])
         self.trigger.show_choices(self.scene)
         self.read_now()
 
@@ -409,6 +409,7 @@ class Signals(QWidget):
         if station is None:
             return False
         self._meet(station)
+        self.pause.setChecked(False)  # else it would be what was seen before
         self.pause.setChecked(True)
         jump, newest_ns = jump_to(self.scene, station, stamp_ns, around_s), self.scene.newest_ns
         if jump is None or newest_ns is None:
@@ -439,8 +440,7 @@ class Signals(QWidget):
         station = self._desk.selected
         one = None if station is None else event_beside(self._jump, station, way)
         if one is not None:
-            found = self.show_at(one.at_ns)
-            self.tell(f"{one.kind.value}: {one.text}" if found else "that is too long ago")
+            self.tell(f"{one.kind.value}: {one.text}" if self.show_at(one.at_ns) else "that is too long ago")
 
     def _flag(self, station: Station) -> None:
         """Every plot shows what happened in its time."""

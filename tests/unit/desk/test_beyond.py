@@ -275,3 +275,32 @@ def test_a_robots_words_are_one_line_whatever_they_hold(bench: Bench) -> None:
     assert bench.station.robot.parts["left_knee"].problem == "no heartbeat → nothing to do"
     with one_moment():
         assert not any("\n" in one.alarm.line + one.alarm.check for one in bench.station.alarms.active)
+
+
+def test_a_fall_lasts_over_the_reset_of_the_stop_after_it(bench: Bench) -> None:
+    now(bench, trunk__tilt_forward=1.5)
+    assert told(bench.station, Kind.FALLEN) is not None
+    now(bench, trunk__tilt_forward=1.5, **{f"{joint}__state": 6.0 for joint in JOINTS})
+    assert told(bench.station, Kind.FALLEN) is not None, "nobody has stood up"
+
+
+def test_ends_that_become_unknown_end_no_alarm(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_ends(bench.station)
+    now(bench, left_knee__position=2.5)
+    assert told(bench.station, Kind.BEYOND) is not None
+    bench.station.robot.parameters.clear()
+    for later_s in (1.0, 3.0 * beyond.HELD_S):
+        at_s = time.time() + later_s
+        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        now(bench, left_knee__position=2.5)
+        alarm = told(bench.station, Kind.BEYOND)
+        assert alarm is not None
+        assert not alarm.is_now
+
+
+def test_an_imu_on_a_thigh_says_nothing_of_a_fall(bench: Bench) -> None:
+    description = described().description
+    thigh = replace(description.components[-2], name="left_thigh")
+    bench.station.take([Described(replace(description, components=[*description.components, thigh]))])
+    now(bench, left_thigh__tilt_forward=1.5)
+    assert told(bench.station, Kind.FALLEN) is None

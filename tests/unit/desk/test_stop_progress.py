@@ -284,7 +284,7 @@ def test_a_stop_of_what_is_stopped_does_not_make_it_stopped_since_now() -> None:
     """The line said since now, the alarm since when it was."""
     stopping = StopProgress()
     stopping.answered(stopping.sent(), ALL)
-    stopping.since_s = first_s = 1000.0
+    stopping._stood_s = stopping.since_s = first_s = 1000.0
     stopping.answered(stopping.sent(off=JOINTS), ALL)
     assert stopping.since_s == first_s
     assert stopping.text == "STOP confirmed by all 2 drives, already off"
@@ -296,7 +296,7 @@ def test_a_stop_of_what_is_stopped_does_not_make_it_stopped_since_now() -> None:
 def test_a_stop_that_fails_while_another_is_held_is_not_confirmed_since_now() -> None:
     stopping = StopProgress()
     stopping.answered(stopping.sent(), ALL)
-    stopping.since_s = first_s = 1000.0
+    stopping._stood_s = stopping.since_s = first_s = 1000.0
     stopping.failed(stopping.sent(off=JOINTS), "no link")
     assert stopping.state is StopState.NOT_CONFIRMED
     assert stopping.since_s is not None
@@ -348,3 +348,34 @@ def test_what_a_held_stop_has_shown_stays_while_a_drive_is_enabled_again() -> No
     stopping.show([20_000_000], {"left_knee": ["quick stop active"]}, 0)
     stopping.goes_on()
     assert stopping.proofs
+
+
+def test_what_failed_and_moved_on_has_not_stood_since_then() -> None:
+    """Ten minutes in which it still moved counted as stopped."""
+    stopping = StopProgress()
+    stopping.failed(stopping.sent(), "no answer")
+    stopping._sent_s = stopping.since_s = 1000.0
+    stopping.answered(stopping.sent(off=JOINTS), ALL)
+    assert stopping.since_s is not None
+    assert stopping.since_s > 1000.0
+
+
+def test_a_stop_that_never_went_out_does_not_shorten_how_long_it_has_stood() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping._stood_s = stopping.since_s = 1000.0
+    stopping.failed(stopping.sent(off=JOINTS), "nothing was sent: no link")
+    assert stopping.since_s > 1000.0, "not confirmed since just now"
+    stopping.answered(stopping.sent(off=JOINTS), ALL)
+    assert stopping.since_s == 1000.0
+
+
+def test_rows_that_come_late_correct_since_when_it_has_stood() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), ALL)
+    stopping._stood_s = stopping.since_s = 1000.0
+    stopping.answered(stopping.sent(off=JOINTS, at_ns=10**12), ALL, at_ns=10**12 + 9)
+    assert stopping.since_s == 1000.0
+    enabled: dict[str, list[str | None]] = {"left_knee": ["operation enabled", "quick stop active"]}
+    stopping.show([10**12 - 10**9, 10**12 + 20_000_000], enabled, 0)
+    assert stopping.since_s > 1000.0, "it had been enabled"
