@@ -1,9 +1,11 @@
 """Commissioning as the window knows it: whatever the command does, and does not, nothing is shown as good."""
 
+import dataclasses
 from collections.abc import Callable
 
 import pytest
 
+from server_gui.core.commissioning.alarm import unstopped
 from server_gui.core.commissioning.commissioning import (
     GUARD_S,
     KILL_S,
@@ -329,3 +331,20 @@ def test_a_window_that_is_closed_owes_no_stop_where_nothing_moved(played: Played
     playing.hand(played)
     played.model.close(1.0)
     assert len(played.talkers) == 1
+
+
+def test_a_stop_that_was_not_confirmed_stays_named_when_another_robot_is_commissioned(played: Played) -> None:
+    playing.stop_not_confirmed(played)
+    (alarm,) = unstopped(played.model)
+    assert (alarm.where, alarm.what) == (played.model.name, played.model.problem)
+    played.model.start(dataclasses.replace(WISH, file="/home/ada/exo-02.toml"))
+    assert stage(played) is Stage.STARTING
+    assert unstopped(played.model) == [alarm]
+    again = Played()
+    playing.stop_not_confirmed(again)
+    again.model.stop()
+    again.model.look()
+    again.hear(stopped())
+    again.end(0)
+    assert stage(again) is Stage.STOPPED
+    assert unstopped(again.model) == []
