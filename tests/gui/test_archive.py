@@ -33,7 +33,7 @@ from server_gui.views.widgets.time_axis import SHOWN
 from tests.gui.archives import RATE_HZ, SECONDS, Shown, cell, play, record
 from tests.gui.fakes import Bench
 from tests.gui.test_recording import FakeKeeper, report
-from tests.support.desk import walking
+from tests.support.desk import described, looked, walking
 from tests.support.journals import RobotsJournal
 
 
@@ -154,6 +154,10 @@ def test_events_are_called_live_while_a_recording_is_played(
     title = full_window.docks[2].titleBarWidget()
     assert isinstance(title, DockTitle)
     assert title.name.text() == "Events, live"
+    bench.station.take([described(), walking(300), looked()])
+    bench.draw(full_window)
+    strip = full_window.alarms
+    assert strip.headline.text().startswith("Live: "), "those of the recording are with it"
     full_window.tabs.setCurrentIndex(0)
     bench.draw(full_window)
     assert title.name.text() == "Events"

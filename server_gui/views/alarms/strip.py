@@ -38,6 +38,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
+LIVE: Final = "Live: "  # beside a recording that is played, whose alarms are with it
 NEWS_S: Final = 60.0
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
@@ -62,6 +63,7 @@ class AlarmStrip(ClickableFrame):
         self._changed_s = -HOLD_S  # when another alarm took the place of one
         self.told: tuple[Told, ...] = ()
         self.commissioned: Callable[[], Commissioning | None] = lambda: None
+        self.is_beside_replay: Callable[[], bool] = lambda: False
         self.setAccessibleName("Active alarms")
         self._icon, self._words = MarkIcon(theme, 13), _Words()
         self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
@@ -159,7 +161,8 @@ class AlarmStrip(ClickableFrame):
             since_s, said = commissioned.since_s, commissioned.look_of.words
             since = f"{SINCE}{time_of_day(since_s)}, for {lasting(max(0.0, time.time() - since_s))}"
             return mark, f"{commissioned.name} · {mark.word}", f"{since} · {said}"
-        return quiet(self._desk.selected, self._desk.recording)
+        mark, main, rest = quiet(self._desk.selected, self._desk.recording)
+        return mark, f"{LIVE}{main[:1].lower()}{main[1:]}" if self.is_beside_replay() else main, rest
 
     def _turn(self) -> None:
         if self.told or self.list.isVisible():

@@ -121,6 +121,7 @@ class MainWindow(QMainWindow):
         column.addWidget(self._pages, 1)
         self.alarms = AlarmStrip(desk, theme, self._pages)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station, self._watched))
+        self.alarms.is_beside_replay = lambda: self.tabs.shows_playback
         self.alarms.shown.connect(self.show_around)
         self.alarms.resources.connect(self._show_resources)
         self.robots = RobotsPanel(desk, theme)
