@@ -212,14 +212,16 @@ def test_where_a_drive_is_not_known_the_chip_says_what_the_others_do(around: Aro
 def test_a_chip_does_not_change_its_form_with_each_second(header: Header, bench: Bench) -> None:
     """The button that ends a recording came and went under the pointer."""
     bench.station.take([telemetry([time.monotonic_ns()], {"left_knee.position": [0.1]}), looked()])
-    forms: dict[int, set[bool]] = {}
-    for width in range(900, 1500, 4):
-        header.resize(width, header.height())
-        for clock in ("4:47", "4:48", "14:50"):
-            said = Said(Tone.GOOD, f"Recording · {clock} 100 rows/s", "", "REC", "")
-            header.recording.say(_words(bench.desk.recording, said, None))
-            header._fit()
-            forms.setdefault(width, set()).add(header.recording._is_brief)
-            if len(forms[width]) > 1 and not header.recording._is_brief:
-                raise AssertionError(f"at {width} px it came back with the next second")
-    assert {True, False} <= set().union(*forms.values()), "both forms were seen"
+    said = Said(Tone.GOOD, "Recording 4:47", "", "REC", "")
+    header.recording.say(_words(bench.desk.recording, said, None))
+    forms = []
+    for room in range(300, 900):
+        both = []
+        for before in (frozenset[str](), frozenset({"recording"})):
+            header._was_brief = before
+            header._shared(list(header._chips), room)
+            both.append("recording" in header._was_brief)
+        forms.append(tuple(both))
+    assert (False, True) in forms, "what is brief stays so where there is hardly more room"
+    assert forms[-1] == (False, False), "and comes back where there is"
+    assert (True, False) not in forms
