@@ -1,6 +1,7 @@
 """Questions lie beside what is looked at before they are answered."""
 
 import itertools
+import time
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSize
@@ -11,13 +12,15 @@ from gateway.wire.stop import Stopped
 from server_gui.views.confirmation import LOOK_MS, Question, ask
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.recording_chip import ask_name
+from server_gui.views.robots.reset import _ask_again
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.free_place import free_place
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
+from tests.gui.faulty import fault
 from tests.gui.running import wait
-from tests.support.desk import JOINTS, looked, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 ROOM = QRect(0, 0, 100, 100)
 SIZE = QSize(40, 40)
@@ -183,3 +186,18 @@ def test_a_question_with_two_fields_has_room_for_all_of_its_words(
     needed = question.words.heightForWidth(question.words.width())
     assert question.words.height() >= needed
     assert question.act.geometry().bottom() < question.height()
+
+
+def test_a_card_about_a_fault_stays_while_nobody_knows_its_drive(window: MainWindow, bench: Bench) -> None:
+    """It went with the drive that fell silent, as if its fault were over."""
+    fault(bench)
+    _ask_again(window, bench.station, "left_knee stays in fault", ())
+    for left_knee, stays in ((None, True), (6.0, False)):
+        now_ns = time.monotonic_ns()
+        states: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+        states["left_knee.state"] = [left_knee]
+        bench.station.take([telemetry([now_ns], states, now_ns), looked()])
+        if stays:
+            QTest.qWait(3 * LOOK_MS)
+            assert window.findChildren(Question)
+    wait(lambda: not window.findChildren(Question), "went")
