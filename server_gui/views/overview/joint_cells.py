@@ -187,14 +187,10 @@ def _of_values(station: Station, joint: str) -> list[Alarm]:
 
 def at_fault(station: Station, joints: list[str]) -> frozenset[int]:
     """Return the columns of the values that the drives' errors are about, or that are wrong themselves."""
-    is_one_hot = any(is_hot(_known(station, one, "temperature")) for one in joints)
+    is_one_hot = any(is_hot(station.robot.values.get(f"{one}.temperature")) for one in joints)
     hot = frozenset({TEMPERATURE} if is_one_hot else ())
     codes = [int(station.robot.values.get(f"{joint}.error_code") or 0) for joint in joints]
     return hot | frozenset(ABOUT[code & part] for code in codes for part in FAMILIES if code & part in ABOUT)
-
-
-def _known(station: Station, joint: str, quantity: str) -> float | None:
-    return station.robot.values.get(f"{joint}.{quantity}")
 
 
 def _stop(station: Station, joint: str) -> Cell:
