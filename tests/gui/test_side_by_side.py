@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from PySide6.QtWidgets import QApplication, QMenu
 
-from gateway.units import Units, rounded
+from gateway.units import Units, rounded, with_minus
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.cycle_remarks import CycleRemarks
 from server_gui.core.archive.side_by_side import By
@@ -134,10 +134,14 @@ def test_each_has_a_name_and_a_colour_of_its_own_in_the_bar_in_plots_and_at_curs
     player.beside_bar.cursors.click()
     shown.draw()
     table = player.signals.measuring.table
-    told = [[str(table.item(row, column).text()) for column in (0, 1)] for row in range(3)]  # type: ignore[union-attr]
-    assert [name for name, _ in told] == [f"{channel}, {one}" for one in (*names, "difference")]
-    at_a = [float(value.replace("−", "-")) for _, value in told]
-    assert at_a[2] == pytest.approx(at_a[1] - at_a[0], abs=1e-3)
+    told = [str(table.item(row, 0).text()) for row in range(3)]  # type: ignore[union-attr]
+    assert told == [f"{channel}, {one}" for one in (*names, "difference")]
+    for at_s in (-3.0, -2.73, -2.37, -1.91, -1.18):
+        player.signals._move(0, at_s)
+        shown.draw()
+        ours, theirs, apart = (str(table.item(row, 1).text()) for row in range(3))  # type: ignore[union-attr]
+        between = float(theirs.replace("−", "-")) - float(ours.replace("−", "-"))
+        assert apart == with_minus(f"{between:.5g}"), "as both are shown"
 
 
 def test_while_two_are_compared_plots_have_the_room_of_the_tools_until_these_are_asked_for(

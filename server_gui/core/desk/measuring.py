@@ -21,11 +21,6 @@ class Measured:
     mean: float | None = None
     sd: float | None = None
 
-    @property
-    def difference(self) -> float | None:
-        """From cursor A to cursor B."""
-        return None if self.a is None or self.b is None else self.b - self.a
-
 
 def nearest(times: Floats, at_s: float) -> int | None:
     """Return the row whose time is nearest to `at_s` (s, `times` rising); None where there is none."""

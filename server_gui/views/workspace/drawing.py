@@ -1,6 +1,6 @@
 """Draws what a scene shows into its cards, and says what they show."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -77,19 +77,6 @@ def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float |
 def _when(at_s: float, session_s: float | None) -> str:
     """Return a time (s until the newest row) as the axis of time says it, to 10 ms."""
     return time_text(round(at_s, 2)) if session_s is None else session_text(session_s + at_s, 0.01)
-
-
-def columns(scene: Scene, text: str, times: Floats) -> Iterator[tuple[str, Floats]]:
-    """Yield a curve's name and values at these times; with something beside, of both, and how they differ."""
-    name, values = scene.meaning(text).name, scene.values(text, len(times))
-    if scene.names is None:
-        yield name, values
-        return
-    here, beside = scene.names
-    theirs = scene.values_beside(text, times)
-    yield f"{name}, {here}", values
-    yield f"{name}, {beside}", theirs
-    yield f"{name}, difference", theirs - values
 
 
 def flag(scene: Scene, cards: Sequence[AnyPlot], found: Sequence[Flag], newest_ns: int) -> None:

@@ -60,7 +60,7 @@ class Measuring(Card):
         for place, (name, unit, found) in enumerate(rows):
             ends, span = (found.a, found.b), (found.low, found.high, found.mean, found.sd)
             at_ends, more = ([_text(unit, value) for value in values] for values in (ends, span))
-            texts = (name, *at_ends, _difference(unit, found), *more, unit.symbol)
+            texts = (name, *at_ends, _text(unit, apart(unit, found.a, found.b)), *more, unit.symbol)
             for column, text in enumerate(texts):
                 self._set(place, column, text)
         self._share()
@@ -148,9 +148,9 @@ def _number(shown: float) -> str:
     return f"{shown:.5g}"
 
 
-def _difference(unit: Unit, found: Measured) -> str:
-    """Return how much more it is at B, as both are shown."""
-    if found.a is None or found.b is None:
-        return "–"
-    a, b = (float(_number(value * unit.scale)) for value in (found.a, found.b))
-    return with_minus(_number(b - a))
+def apart(unit: Unit, one: float | None, other: float | None) -> float | None:
+    """Return how much more the other is, as both are shown; None where one is not known."""
+    if one is None or other is None:
+        return None
+    before, after = (float(_number(value * unit.scale)) for value in (one, other))
+    return (after - before) / unit.scale

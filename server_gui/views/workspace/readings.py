@@ -1,15 +1,15 @@
 """What the cursors read of the curves that are drawn."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from server_gui.core.desk.measuring import measure, row_at
+from gateway.units import Unit
+from server_gui.core.desk.measuring import Measured, measure, row_at
 from server_gui.core.workspace.scene import Scene
-from server_gui.views.workspace.drawing import columns
-from server_gui.views.workspace.measuring import Row
+from server_gui.views.workspace.measuring import Row, apart
 from server_gui.views.workspace.unit_plot import UnitPlot
 
 Floats = npt.NDArray[np.float64]
@@ -37,14 +37,35 @@ def readings(
         return None
     a, b = (row_at(times, cursor) for cursor in at_s)
     first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
+
+    def measured(values: Floats) -> Measured:
+        return measure(values, a, b, int(first), int(last))
+
+    stamps = scene.times(seconds)
     rows = [
-        (name, plot.unit, measure(values, a, b, int(first), int(last)))
+        row
         for plot in plots
         for text in plot.drawn
-        for name, values in columns(scene, text, scene.times(seconds))
+        for row in _rows(scene, plot.unit, text, stamps, measured)
     ]
     a_s, b_s = (s if at is None else float(times[at]) for s, at in zip(at_s, (a, b), strict=True))
     return Readings(a_s, b_s, rows)
+
+
+def _rows(
+    scene: Scene, unit: Unit, text: str, times: Floats, measured: Callable[[Floats], Measured]
+) -> Iterator[Row]:
+    """Yield what a curve is; with another beside, that too, and how they differ: at cursors, as shown."""
+    name, values = scene.meaning(text).name, scene.values(text, len(times))
+    here = measured(values)
+    if scene.names is None:
+        yield name, unit, here
+        return
+    theirs = scene.values_beside(text, times)
+    beside, between = measured(theirs), measured(theirs - values)
+    between = replace(between, a=apart(unit, here.a, beside.a), b=apart(unit, here.b, beside.b))
+    for said, found in zip((*scene.names, "difference"), (here, beside, between), strict=True):
+        yield f"{name}, {said}", unit, found
 
 
 def seconds_ago(scene: Scene, seconds: float) -> Floats:
