@@ -35,6 +35,11 @@ def plain(text: str, keep: str = "") -> str:
     return "".join(one if one in keep or one.isprintable() else _escaped(one) for one in text)
 
 
+def one_line(text: str) -> str:
+    """Return what somebody else says without lines of its own, which would look like ours."""
+    return " ".join(text.split())
+
+
 def json_plain(text: str) -> str:
     """Return a line of JSON in which nothing commands a terminal; it says the same to machines."""
     if text.isprintable():

@@ -7,6 +7,7 @@ from typing import Any
 
 from gateway.commission.controller import CONTROLLER
 from gateway.commission.draft import Draft, DraftValue
+from gateway.plain_text import one_line
 
 HEAD = """\
 # {robot}, commissioned {when} by {who}. Quantities are SI: rad, m, s, N·m.
@@ -47,7 +48,7 @@ class Written:
 def text(draft: Draft, who: str, when: str) -> str:
     """Return the file as the draft has it."""
     name = str(draft.value("robot", "name"))
-    return HEAD.format(robot=name, when=when, who=_plain(who)) + "\n".join(_tables(draft))
+    return HEAD.format(robot=name, when=when, who=one_line(who)) + "\n".join(_tables(draft))
 
 
 def unfinished(draft: Draft) -> tuple[str, ...]:
@@ -115,7 +116,7 @@ def _guard(draft: Draft) -> Iterator[str]:
 def _table(name: str, keys: Mapping[str, DraftValue]) -> Iterator[str]:
     yield f"[{name}]"
     for key, found in keys.items():
-        yield f"# {_plain(found.how)}" if key == "#" else line(key, found)
+        yield f"# {one_line(found.how)}" if key == "#" else line(key, found)
     yield ""
 
 
@@ -124,14 +125,9 @@ def line(key: str, found: DraftValue) -> str:
     value = f"{key} = {_value(found.value)}"
     if not found.how:
         return value
-    comment = f"# {_plain(found.how)}"
+    comment = f"# {one_line(found.how)}"
     beside = f"{value:<{WIDTH - 1}} {comment}"
     return beside if len(value) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{value}"
-
-
-def _plain(text: str) -> str:
-    """Return the text for a comment, which ends with its line."""
-    return " ".join(text.split())
 
 
 def _value(value: Any) -> str:

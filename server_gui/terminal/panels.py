@@ -18,9 +18,9 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import ENABLED, GLYPHS
-from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.alarms.texts import RESET_BUTTON
 from server_gui.core.alarms.unconfirmed import enabled_mark, unstopped
+from server_gui.core.alarms.undriven import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot

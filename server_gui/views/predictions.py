@@ -9,8 +9,8 @@ from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import TrustLevel
-from server_gui.core.alarms.robot_alarms import HELD, IN_FAULT, NONE_ENABLED, STOPPING
 from server_gui.core.alarms.texts import UNSTOPPED, Kind
+from server_gui.core.alarms.undriven import HELD, IN_FAULT, NONE_ENABLED, STOPPING
 from server_gui.core.desk.confidence import NOT_SEEN, Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station

@@ -485,7 +485,7 @@ def test_a_joint_beyond_its_ends_says_so_in_its_row(
     theme: Theme, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = (FoundBeyond(Kind.BEYOND, "left_knee", "position", "it is at 130°"),)
-    monkeypatch.setattr(bench.station._beyond, "look", lambda _robot, **_: found)
+    monkeypatch.setattr(bench.station._alarms.beyond, "look", lambda _robot, **_: found)
     bench.station.take([walking(100), looked()])
     row = row_of(bench.station, "left_knee", bench.desk)
     assert (row[ERROR].text, row[ERROR].colour, row[ANGLE].colour) == ("beyond its ends", "bad", "bad")

@@ -8,6 +8,7 @@ from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import is_off
 
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
+FAULTY: Final = ("fault", "fault reaction active")
 STATES_S: Final = 5.0  # of an older row nobody says which drives are off; late rows correct it
 
 
@@ -60,6 +61,11 @@ def device_of(robot: Robot, name: str) -> Mapping[str, Any]:
 def state_words(robot: Robot) -> dict[str, str | None]:
     """Return the state of each joint's drive; None where it is not known."""
     return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
+
+
+def any_enabled(robot: Robot) -> bool:
+    """Return whether some drive is enabled, as far as is known."""
+    return ENABLED in state_words(robot).values()
 
 
 def unknown_joints(robot: Robot) -> list[str]:

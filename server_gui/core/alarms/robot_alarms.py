@@ -8,54 +8,33 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import ConnectionState
+from gateway.plain_text import one_line
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
+from server_gui.core.alarms.advice import split_advice
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.beyond import FoundBeyond
 from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.causes import Stall, stood_still
-from server_gui.core.alarms.drive_states import (
-    device_of,
-    drives_did,
-    is_live,
-    listed,
-    state_words,
-)
-from server_gui.core.alarms.marks import ENABLED, age_text
+from server_gui.core.alarms.drive_states import FAULTY, device_of, drives_did, listed
+from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
 from server_gui.core.alarms.simulated import is_simulated, without_wires
+from server_gui.core.alarms.stop_alarms import stop_alarms
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.alarms.unconfirmed import (
-    again_alarm,
-    enabled_again,
-    let_go_alarm,
-    unconfirmed_alarm,
-)
+from server_gui.core.alarms.undriven import undriven
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
-from server_gui.core.tuning.stop import StopProgress, StopState, is_off
+from server_gui.core.tuning.stop import StopProgress
 
-DRIVES_NOT_KNOWN: Final = "it has told of no drive"
-EVERY_OFF: Final = "every drive is off"
-OFF: Final = frozenset({"switch on disabled"})
-# Why a robot does not drive its wearer.
-HELD: Final = "a stop is held"
-STOPPING: Final = "drives stop"
-IN_FAULT: Final = "a drive is in fault"
 NO_CODE_YET: Final = "its code has not come yet"
 NO_CODE_THEN: Final = "its code is not known at this instant"
-NONE_ENABLED: Final = "no drive is enabled"
-SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
-_QUICK_STOP: Final = "quick stop active"
-_IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _MISSING: Final = re.compile(r"(?<=heartbeat has been missing for )(?=\d)")  # it is so still, and longer
-_ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
-_ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -96,14 +75,13 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
 
 def _in_one_line(alarm: Alarm) -> Alarm:
     """Return it without lines of its own, which would look like ours: a robot may say what it likes."""
-    what, did = (" ".join(text.split()) for text in (alarm.what, alarm.did))
-    check, why, aside = (" ".join(text.split()) for text in (alarm.check, alarm.why, alarm.aside))
+    what, did, check, why, aside = map(one_line, (alarm.what, alarm.did, alarm.check, alarm.why, alarm.aside))
     return dataclasses.replace(alarm, what=what, did=did, check=check, why=why, aside=aside)
 
 
 def _found(facts: Facts) -> Iterator[Alarm]:
     robot = facts.robot
-    yield from _of_stop(robot, facts.stopping)
+    yield from stop_alarms(robot, facts.stopping)
     if not robot.is_recording:
         yield from _of_link(robot, facts.address)
     for name in robot.names("joint"):
@@ -119,58 +97,6 @@ def _found(facts: Facts) -> Iterator[Alarm]:
     yield from _of_danger(facts)
     if not robot.is_recording:
         yield from stood_still(facts.stalls)
-
-
-# --- STOP
-
-
-def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
-    if stopping.state is StopState.NOT_CONFIRMED:
-        yield unconfirmed_alarm(robot, stopping)
-    elif stopping.is_let_go:
-        yield let_go_alarm(robot, stopping)
-    elif enabled_again(robot, stopping):
-        yield again_alarm(robot, stopping)
-    elif stopping.held and not (stopping.state is StopState.SENT and any_enabled(robot)):
-        what, by = stopping.said
-        yield Alarm(
-            Kind.STOPPED,
-            "",
-            what,
-            did=_after_stop(robot, stopping),
-            check=go_on(Kind.STOPPED, robot),
-            since_s=stopping.since_s,
-            aside=by,
-        )
-    elif stopping.was_ended and not any_enabled(robot):
-        words = set(state_words(robot).values())
-        is_every = is_live(robot) and words and words <= OFF
-        what = EVERY_OFF if is_every else drives_did(robot) or DRIVES_NOT_KNOWN
-        yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
-
-
-def go_on(kind: Kind, robot: Robot) -> str:
-    """Return how to go on after a stop, as the robot's gateway may."""
-    return check_of(kind, role=role_of(robot), start_by=robot.start_by)
-
-
-def role_of(robot: Robot) -> str | None:
-    """Return the role of the robot's gateway on its buses."""
-    return None if robot.description is None else robot.description.role
-
-
-def any_enabled(robot: Robot) -> bool:
-    """Return whether some drive is enabled, as far as is known."""
-    return ENABLED in state_words(robot).values()
-
-
-def _after_stop(robot: Robot, stopping: StopProgress) -> str:
-    """Return what the drives' states have shown; where not all have shown it, how they are."""
-    shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
-    every = "all " if len({proof.state for proof in stopping.proofs.values()}) == 1 else ""
-    return (
-        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, drives_did(robot))))
-    )
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:
@@ -228,7 +154,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
 
 def _is_in_fault(robot: Robot, part: FollowedComponent) -> bool:
     is_told = part.state == "fault" and "in fault" in (part.problem or "")
-    return is_told or robot.word(f"{part.name}.state") in _IN_FAULT
+    return is_told or robot.word(f"{part.name}.state") in FAULTY
 
 
 def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
@@ -260,7 +186,7 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
                 Kind.REPORTS, part.name, what, where, check=check, channel=channel, clears=True, is_now=is_now
             )
         return
-    if part.kind == "joint" and (robot.word(f"{part.name}.state") in _IN_FAULT or "in fault" in problem):
+    if part.kind == "joint" and (robot.word(f"{part.name}.state") in FAULTY or "in fault" in problem):
         return  # told as the drive's fault
     if kind is None:
         what = problem or f"the robot says {part.state!r} of it"
@@ -300,22 +226,6 @@ def _of_silent(robot: Robot) -> Iterator[Alarm]:
         yield Alarm(
             Kind.PART_STALE, name, NO_VALUES, _where(robot, name), check=check, node=_bus(robot, name)
         )
-
-
-def split_advice(problem: str) -> tuple[str, str]:
-    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`.
-
-    What goes on after an advice belongs to it, unless it begins as only what is wrong does.
-    """
-    things, advice = list[str](), list[str]()
-    for clause in problem.split("; "):
-        thing, *check = _ADVICE.split(clause, maxsplit=1)
-        if not check and advice and not _ANOTHER.match(clause):
-            advice[-1] += f"; {clause}"
-        else:
-            things.append(thing)
-            advice += check
-    return "; ".join(things), "; ".join(dict.fromkeys(advice))
 
 
 def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
@@ -402,23 +312,6 @@ def _of_beyond(facts: Facts) -> Iterator[Alarm]:
 
 
 # --- danger
-
-
-def undriven(robot: Robot, stopping: StopProgress) -> str:
-    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
-    words = [None if word is None else word.lower() for word in state_words(robot).values()]
-    if stopping.held and not enabled_again(robot, stopping):
-        return HELD
-    if _QUICK_STOP in words:
-        return STOPPING
-    if any(word in _IN_FAULT for word in words):
-        return IN_FAULT
-    return NONE_ENABLED if words and all(map(is_off, words)) else ""
-
-
-def is_idle(robot: Robot, stopping: StopProgress) -> bool:
-    """Return whether every drive is known to be off, by nothing that has happened."""
-    return undriven(robot, stopping) == NONE_ENABLED
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:

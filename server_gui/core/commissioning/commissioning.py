@@ -13,6 +13,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Final, Protocol
 
+from gateway.plain_text import one_line
 from server_gui.core.commissioning import messages
 from server_gui.core.commissioning.messages import (
     Message,
@@ -221,7 +222,7 @@ class Commissioning:
         question, talker = self.question, self._talker
         if question is None or talker is None or not self.can_answer:
             return False
-        line = " ".join(text.split())
+        line = one_line(text)
         self._note(LogLineKind.ANSWERED, line or (question.default or ("done" if question.press else "")))
         self.question, self._live, self.problem = None, (), ""
         self.news.clear()

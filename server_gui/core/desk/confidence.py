@@ -7,7 +7,7 @@ from typing import Final
 
 from ml.registry.card import DataSource
 from ml.serving.trust import TrustLevel
-from server_gui.core.alarms.robot_alarms import undriven
+from server_gui.core.alarms.undriven import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import class_name, told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.drive_states import listed, unknown_joints
-from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.drive_states import any_enabled, listed, unknown_joints
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.alarms.unconfirmed import unstopped
 from server_gui.core.desk.station import Station

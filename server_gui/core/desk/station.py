@@ -19,13 +19,12 @@ from gateway.wire.robot import Description
 from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm, Alarms
-from server_gui.core.alarms.beyond import Beyond
-from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.robot_alarms import Facts, any_enabled, go_on, is_idle
-from server_gui.core.alarms.robot_alarms import alarms as found
+from server_gui.core.alarms.robot_alarms import Facts
+from server_gui.core.alarms.stop_alarms import go_on
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.watch import AlarmWatch
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.beyond_news import BeyondNews
@@ -48,7 +47,6 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
-from server_gui.core.follow.frame_time import FrameTime, this_moment
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
@@ -100,20 +98,22 @@ class Station:
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.experiment: Run | None = None  # an A/B trial or a sweep, the newest
-        self.judged, self.stopping = EditList(), StopProgress()
+        self.judged = EditList()
+        self.stopping = StopProgress()
         self.control = LeaseState()
-        self.edits, self.writing = Edits(), WriteProgress()
+        self.edits = Edits()
+        self.writing = WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
         self.flash = Flash(self.audit)
         self.objects = Objects(commands, deliver)
-        self._commands, self._deliver = commands, deliver
+        self._commands = commands
+        self._deliver = deliver
         self.news = news
-        self._alarms = Alarms()
-        self._judged: FrameTime | None = None  # by which the alarms were looked for, since anything has come
-        self._watch = RobotNews(self.tell)
-        self._watched_ns, self._happened = 0, FlagWatch()
-        self._stalls, self._beyond = Stalls(), Beyond()
+        self._alarms = AlarmWatch(self._facts, lambda: self.rings.newest_ns)
+        self._news = RobotNews(self.tell)
+        self._watched_ns = 0
+        self._happened = FlagWatch()
         self._beyond_news = BeyondNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
@@ -166,8 +166,7 @@ class Station:
     @property
     def alarms(self) -> Alarms:
         """What is wrong with it, as of now: a dozen views ask in each frame."""
-        self._look_for_alarms()
-        return self._alarms
+        return self._alarms.look()
 
     def acknowledge(self, alarm: Alarm) -> None:
         """Note that somebody has read it; how to go on after a reset is known then."""
@@ -175,23 +174,11 @@ class Station:
         if alarm.kind is Kind.RESET:
             self.stopping.was_ended = False
 
-    def _look_for_alarms(self) -> None:
-        """Judge what there is to know, once in a moment."""
-        if (moment := this_moment()) is not None and moment is self._judged:
-            return
-        stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
-        is_busy, entries = self.is_overloaded(), self.audit.entries
-        known = (self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
-        facts = Facts(*known, self._beyond.look(self.robot, is_off=is_idle(self.robot, self.stopping)))
-        if (self.stopping.was_ended or self.stopping.proofs) and any_enabled(self.robot) and self.is_live:
-            self.stopping.goes_on()
-        self._alarms.look(
-            found(facts),
-            now_s,
-            self.rings.newest_ns,
-            lambda active: gathered(active, stalls, now_s, len(self.robot.parts)),
+    def _facts(self) -> Facts:
+        danger, is_busy = self.predictions.danger, self.is_overloaded()
+        return Facts(
+            self.robot, self.stopping, self.address, self.audit.entries, danger=danger, is_overloaded=is_busy
         )
-        self._judged = moment  # by all of it: what raises half-way is looked for again
 
     @property
     def mark(self) -> Mark:
@@ -213,7 +200,7 @@ class Station:
 
     def take(self, events: Iterable[Event]) -> None:
         """Apply what has come, and look for what is new."""
-        self._judged = None
+        self._alarms.again()
         for event in events:
             if self.experiment is not None:
                 self.experiment.take(event)
@@ -249,14 +236,13 @@ class Station:
                     self.cost = None  # it was of the link that there was
                     self.predictions.clear()
                     self.flash.forget()
-                    self._stalls.forget()
+                    self._alarms.stalls.forget()
             self.flags.add(*self._happened.take(event, self.robot, self.rings.newest_ns))
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
-            self._watch.look(self.robot)
-            self._look_for_alarms()  # now, so that it is known since when
-            self._beyond_news.look(self._alarms.active)
+            self._news.look(self.robot)
+            self._beyond_news.look(self.alarms.active)  # looked for now, so that it is known since when
             self.reverted.look_if_over(now_ns)
             self._others.own(*(() if self.experiment is None else self.experiment.writes))
             self._others.look(now_ns)
@@ -266,8 +252,8 @@ class Station:
         if self.robot.is_recording:
             return
         received_s = self.robot.now_s() - (time.monotonic_ns() - batch.received_ns) / 1e9
-        stall = self._stalls.take(event.stream, batch.stamps_ns, batch.received_ns, received_s)
-        if stall is not None and self._stalls.is_news(stall):
+        stall = self._alarms.stalls.take(event.stream, batch.stamps_ns, batch.received_ns, received_s)
+        if stall is not None and self._alarms.stalls.is_news(stall):
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:
@@ -299,7 +285,7 @@ class Station:
 
     def take_prediction(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
-        self._judged = None
+        self._alarms.again()
         before = self.predictions.danger
         self.predictions.take(news)
         if isinstance(news, Ruled):

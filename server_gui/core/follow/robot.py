@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from gateway.client import ConnectionState
+from gateway.plain_text import one_line
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
 from gateway.wire.parameter import ParameterValue
@@ -233,7 +234,7 @@ class Robot:
         self.values = {name: value for name, value in self.values.items() if name in known}
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
-            part.name: FollowedComponent(part.name, part.kind, part.state, None, _in_one_line(part.problem))
+            part.name: FollowedComponent(part.name, part.kind, part.state, None, _problem(part.problem))
             for part in event.description.components
         }
 
@@ -269,10 +270,9 @@ def _part(known: FollowedComponent, found: QualityInfo) -> FollowedComponent:
         known.kind,
         str(found.get("state", "unknown")),
         age_ms if isinstance(age_ms, int | float) else None,
-        _in_one_line(problem),
+        _problem(problem),
     )
 
 
-def _in_one_line(problem: object) -> str | None:
-    """Return what a robot says of a part; a line of its own would look like one of ours."""
-    return None if problem is None else " ".join(str(problem).split())
+def _problem(problem: object) -> str | None:
+    return None if problem is None else one_line(str(problem))

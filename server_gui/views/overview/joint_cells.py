@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.units import Unit, rounded
+from server_gui.core.alarms.advice import split_advice
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.beyond import is_hot
 from server_gui.core.alarms.marks import GLYPHS
-from server_gui.core.alarms.robot_alarms import split_advice
 from server_gui.core.alarms.severity import colour_of
 from server_gui.core.alarms.texts import OF_VALUES, Kind, error_text
 from server_gui.core.alarms.unconfirmed import enabled_mark

@@ -8,8 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from gateway.units import Units, rounded
-from server_gui.core.alarms.drive_states import unknown_joints
-from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.drive_states import any_enabled, unknown_joints
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.alarms.unconfirmed import enabled_mark, remedy, unstopped
 from server_gui.core.desk.desk import Desk

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from gateway.parameter_files.contents import FileProblem
 from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
-from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.drive_states import any_enabled
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as

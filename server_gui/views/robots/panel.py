@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
-from server_gui.core.alarms.robot_alarms import any_enabled
+from server_gui.core.alarms.drive_states import any_enabled
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.worst_state import STOP_SENT
 from server_gui.core.desk.desk import Desk

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.drive_states import listed, unknown_joints
 from server_gui.core.alarms.marks import ENABLED
-from server_gui.core.alarms.robot_alarms import go_on
+from server_gui.core.alarms.stop_alarms import go_on
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.unconfirmed import enabled_again, remedy, silent_controllers
 from server_gui.core.desk.station import Station

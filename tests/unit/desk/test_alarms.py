@@ -14,10 +14,10 @@ from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
+from server_gui.core.alarms import watch as watch_module
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES, Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.desk import station as station_module
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, Event, Journalled, LinkChanged, Looked
 from server_gui.core.follow.frame_time import one_moment
@@ -357,7 +357,7 @@ def test_a_look_for_alarms_that_ends_half_way_is_no_look(
     with one_moment():
         bench.station.take([])
         with monkeypatch.context() as patched:
-            patched.setattr(station_module, "found", fails)
+            patched.setattr(watch_module, "alarms", fails)
             for _ in range(2):  # the second place that asks gets no old ones either
                 with pytest.raises(ValueError, match="a mistake"):
                     _ = bench.station.alarms

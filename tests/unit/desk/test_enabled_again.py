@@ -8,9 +8,9 @@ import pytest
 from gateway.client import ConnectionState
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.marks import drives_mark
-from server_gui.core.alarms.robot_alarms import HELD, undriven
 from server_gui.core.alarms.texts import UNSTOPPED, Kind
 from server_gui.core.alarms.unconfirmed import enabled_again, enabled_mark, remedy
+from server_gui.core.alarms.undriven import HELD, undriven
 from server_gui.core.alarms.worst_state import STOP_SENT
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, LinkChanged

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.overload import THEIRS, load_first
-from server_gui.core.alarms.robot_alarms import go_on
 from server_gui.core.alarms.simulated import FAULTS, NO_WIRES, advised, without_wires
+from server_gui.core.alarms.stop_alarms import go_on
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.resetting import after_reset

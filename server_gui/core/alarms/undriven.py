@@ -1,0 +1,31 @@
+"""Why a robot does not drive its wearer: what it does then is no sign of anything."""
+
+from typing import Final
+
+from server_gui.core.alarms.drive_states import FAULTY, state_words
+from server_gui.core.alarms.unconfirmed import enabled_again
+from server_gui.core.follow.robot import Robot
+from server_gui.core.tuning.stop import StopProgress, is_off
+
+HELD: Final = "a stop is held"
+STOPPING: Final = "drives stop"
+IN_FAULT: Final = "a drive is in fault"
+NONE_ENABLED: Final = "no drive is enabled"
+_QUICK_STOP: Final = "quick stop active"
+
+
+def undriven(robot: Robot, stopping: StopProgress) -> str:
+    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
+    words = [None if word is None else word.lower() for word in state_words(robot).values()]
+    if stopping.held and not enabled_again(robot, stopping):
+        return HELD
+    if _QUICK_STOP in words:
+        return STOPPING
+    if any(word in FAULTY for word in words):
+        return IN_FAULT
+    return NONE_ENABLED if words and all(map(is_off, words)) else ""
+
+
+def is_idle(robot: Robot, stopping: StopProgress) -> bool:
+    """Return whether every drive is known to be off, by nothing that has happened."""
+    return undriven(robot, stopping) == NONE_ENABLED
