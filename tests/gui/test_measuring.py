@@ -195,8 +195,8 @@ def test_two_cursors_tell_values_their_difference_and_statistics_of_what_is_in_s
     signals: Signals,
 ) -> None:
     signals.cursors.click()
-    signals._move(0, -6.004)
-    signals._move(1, -4.0)
+    signals.two.move(0, -6.004)
+    signals.two.move(1, -4.0)
     assert title(signals) == "A −6.000 s ▸ B −4.000 s Δt +2.000 s · 1/Δt 0.5 Hz"
     assert cell(signals.measuring, 0, "Channel") == KNEE
     assert [cell(signals.measuring, 0, name) for name in ("A", "B", "B − A", "Unit")] == [
@@ -247,18 +247,18 @@ def test_every_figure_is_there_at_every_width_and_none_is_cut(signals: Signals, 
 
 def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signals) -> None:
     signals.cursors.click()
-    signals._move(0, -5.0)
+    signals.two.move(0, -5.0)
     plot = signals.plots[0].plot
     viewport = plot.viewport()
     QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
     QTest.mouseMove(viewport, place(plot, 0.3))
     QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
-    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
+    assert signals.two.at[0] == pytest.approx(-7.0, abs=0.1)
     assert plot.window_s == (-10.0, 0.0)
     assert plot.follows
     assert signals.measuring.isVisible()
-    signals._move(1, -2.0)
-    signals._move(0, -5.0)
+    signals.two.move(1, -2.0)
+    signals.two.move(0, -5.0)
     for key, modifier in (
         (Qt.Key.Key_Right, Qt.KeyboardModifier.NoModifier),
         (Qt.Key.Key_B, Qt.KeyboardModifier.NoModifier),
@@ -271,7 +271,7 @@ def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signal
 
 def test_a_paused_view_is_measured_as_it_stands(signals: Signals, bench: Bench) -> None:
     signals.cursors.click()
-    signals._move(0, -1.0)
+    signals.two.move(0, -1.0)
     signals.pause.click()
     title(signals)
     before = cell(signals.measuring, 0, "A")
@@ -306,7 +306,7 @@ def test_where_there_is_no_sample_nothing_is_told() -> None:
 def test_a_cursor_in_a_gap_reads_nothing(signals: Signals, bench: Bench) -> None:
     add(bench, 1400, 100)  # four seconds nobody has sent
     signals.cursors.click()
-    signals._at = [-3.0, -0.5]
+    signals.two.at = [-3.0, -0.5]
     title(signals)
     view = signals.measuring
     assert [cell(view, 0, column) for column in ("A", "B − A")] == ["–", "–"]

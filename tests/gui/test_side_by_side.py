@@ -137,7 +137,7 @@ def test_each_has_a_name_and_a_colour_of_its_own_in_the_bar_in_plots_and_at_curs
     told = [str(table.item(row, 0).text()) for row in range(3)]  # type: ignore[union-attr]
     assert told == [f"{channel}, {one}" for one in (*names, "difference")]
     for at_s in (-3.0, -2.73, -2.37, -1.91, -1.18):
-        player.signals._move(0, at_s)
+        player.signals.two.move(0, at_s)
         shown.draw()
         ours, theirs, apart = (str(table.item(row, 1).text()) for row in range(3))  # type: ignore[union-attr]
         between = float(theirs.replace("−", "-")) - float(ours.replace("−", "-"))

@@ -286,12 +286,12 @@ def test_cursors_stay_in_the_curves_while_more_of_them_comes(signals: Signals, b
     assert newest_ns is not None
     signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
     signals.cursors.setChecked(True)
-    at_ns = [newest_ns + at_s * 1e9 for at_s in signals._at]
+    at_ns = [newest_ns + at_s * 1e9 for at_s in signals.two.at]
     rows_until(bench, newest_ns + 2_000_000_000)
     signals.refresh()
     now_ns = signals.scene.newest_ns
     assert now_ns is not None
-    assert [now_ns + at_s * 1e9 for at_s in signals._at] == pytest.approx(at_ns, abs=1e6)
+    assert [now_ns + at_s * 1e9 for at_s in signals.two.at] == pytest.approx(at_ns, abs=1e6)
 
 
 def test_another_robot_is_shown_as_it_is_now_without_what_happened_to_the_first(

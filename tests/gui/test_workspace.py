@@ -389,7 +389,7 @@ def test_a_note_is_kept_at_the_cursor_where_somebody_records_and_never_goes_to_a
     assert not signals.findChildren(Question)
     notes = signals._notes = Kept()
     signals.cursors.click()
-    signals._move(1, -2.0)
+    signals.two.move(1, -2.0)
     signals.tools.note.click()
     question = next(one for one in signals.findChildren(Question) if one.windowTitle() == "Note")
     assert "−2 s, where the cursor is" in question.words.text()

@@ -11,7 +11,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.measuring import nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import default_file
 from server_gui.core.workspace.exporting import save_csv
@@ -33,14 +32,13 @@ from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
 from server_gui.views.workspace.jump import Jump, event_beside, happened, jump_to
 from server_gui.views.workspace.layout_menu import LayoutMenu
-from server_gui.views.workspace.measuring import Measuring
 from server_gui.views.workspace.note import ask_note
 from server_gui.views.workspace.plot_area import PlotArea
-from server_gui.views.workspace.readings import readings, seconds_ago
 from server_gui.views.workspace.refusal import Refusal
 from server_gui.views.workspace.state_words import state_words
 from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
+from server_gui.views.workspace.two_cursors import TwoCursors
 from server_gui.views.workspace.unit_plot import UnitPlot
 
 Floats = npt.NDArray[np.float64]
@@ -71,15 +69,16 @@ class Signals(QWidget):
         self.area = PlotArea(self.scene, theme)
         self.area.arranged.connect(self._looked_again)
         self.area.zoomed.connect(self._zoomed)
-        self.area.moved.connect(self._move)
+        self.two = TwoCursors(self.scene, self.area, theme, lambda: self._seconds, self.read_now)
+        self.area.moved.connect(self.two.move)
         self.area.fitted.connect(self._follow)
         self.area.hovered.connect(self._hovered)
-        self._begun, self._active, self._pace = False, 0, RefreshRate()
+        self._begun = False
+        self._pace = RefreshRate()
         self._jump: Jump | None = None
         self._met: Station | None = None  # the robot that is shown
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
-        self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._hover: float | None = None
         self.setObjectName("page")
         self.channels = ChannelTree()
@@ -89,9 +88,7 @@ class Signals(QWidget):
         self._words = QLineEdit(placeholderText="Filter channels")
         self._words.setAccessibleName("Filter of the channels")
         self._words.textChanged.connect(self.channels.show_only)
-        self.measuring = Measuring(theme)
-        self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
-        self.measuring.stepped.connect(self._step)
+        self.measuring = self.two.measuring
         self.expression = ExpressionBar(theme, self.scene.meaning)
         self.expression.written.connect(self.area.put)
         self.trigger = TriggerBar(theme)
@@ -130,7 +127,7 @@ class Signals(QWidget):
     @property
     def plots(self) -> list[UnitPlot]:
         """Those over time."""
-        return [card for card in self.cards if isinstance(card, UnitPlot)]
+        return self.area.plots
 
     def refresh(self) -> None:
         """Draw what is arranged; while it stands still, what was there then."""
@@ -150,8 +147,7 @@ class Signals(QWidget):
             self._say_more()
             self._flag(station)
             read(self.scene, self.cards, station, self._read_s)
-            if self.cursors.isChecked():
-                self._measure()
+            self.two.read()
 
     def _meet(self, station: Station) -> None:
         """Show another robot as it is: nobody has paused that one."""
@@ -245,7 +241,7 @@ class Signals(QWidget):
         self.pause.toggled.connect(self._paused)
         self.fit.clicked.connect(self._follow)
         self.box.toggled.connect(self._choose_by_box)
-        self.cursors.toggled.connect(self._show_cursors)
+        self.cursors.toggled.connect(self.two.show)
         self.tools.expression.toggled.connect(self.expression.open)
         self.tools.trigger.toggled.connect(self._show_trigger)
         self.tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
@@ -255,7 +251,7 @@ class Signals(QWidget):
         """Make the plots anew; what part of the time is in sight stays."""
         self.area.build(self._seconds, self._window if self.plots else None)
         self._choose_by_box(self.box.isChecked())
-        self._mark()
+        self.two.mark()
         self.scene.keep_more(self._window[0])
         self.trigger.show_choices(self.scene)
         self.read_now()
@@ -309,7 +305,7 @@ class Signals(QWidget):
     @property
     def _window(self) -> tuple[float, float]:
         """The visible part of the past, s until the newest row."""
-        return self.plots[0].plot.window_s if self.plots else (-self._seconds, 0.0)
+        return self.area.in_sight(self._seconds)
 
     def _look_wider(self, wider: float, later: float) -> None:
         """See so many times of the time, moved by a share of it."""
@@ -366,7 +362,7 @@ class Signals(QWidget):
         if problem or newest_ns is None:
             self.tell(f"▲ no note: {problem or 'no row has come yet'}")
             return
-        at_s = self._at[self._active] if self.cursors.isChecked() else 0.0
+        at_s = self.two.at[self.two.active] if self.two.are_shown else 0.0
         at_ns = newest_ns + round(at_s * 1e9)
         ask_note(self, self._desk, at_s, lambda text: self._notes.add(text, at_ns), self.tell)
 
@@ -430,9 +426,7 @@ class Signals(QWidget):
         """Show what comes of the seconds after the instant that was asked for."""
         jump, before_ns = self._jump, self.scene.newest_ns or 0
         if jump is not None and jump.take_more(self.scene, station, self._window):
-            moved_s = ((self.scene.newest_ns or 0) - before_ns) / 1e9
-            self._at = [at_s - moved_s for at_s in self._at]  # cursors stay where they are in the curves
-            self._mark()
+            self.two.shift((before_ns - (self.scene.newest_ns or 0)) / 1e9)
             self._show_jump(jump)
 
     def _turn(self, way: int) -> None:
@@ -451,41 +445,6 @@ class Signals(QWidget):
         flag(self.scene, self.cards, [*found, *([] if triggered is None else [triggered])], newest_ns)
         for button in (self.tools.before, self.tools.next):
             button.setEnabled(bool(len(station.flags)))
-
-    # --- cursors
-
-    def _show_cursors(self, on: bool) -> None:
-        left, right = self._window
-        self._at = [left + (right - left) * share for share in (1 / 3, 2 / 3)]
-        self.measuring.setVisible(on)
-        if on:
-            self.measuring.setFocus()
-            bring_into_sight(self.measuring)
-        self._mark()
-        self.read_now()  # measure at once
-
-    def _move(self, cursor: int, to_s: float) -> None:
-        self._active, self._at[cursor] = cursor, to_s
-        self._mark()
-        self.read_now()
-
-    def _step(self, samples: int) -> None:
-        """Move the active cursor by so many samples."""
-        times = seconds_ago(self.scene, self._seconds)
-        row = nearest(times, self._at[self._active])
-        if row is not None:
-            self._move(self._active, float(times[min(max(row + samples, 0), len(times) - 1)]))
-
-    def _mark(self) -> None:
-        at = tuple(self._at) if self.cursors.isChecked() else ()
-        for plot in self.plots:
-            plot.plot.show_cursors(at, self._active)
-
-    def _measure(self) -> None:
-        """Read every curve at the cursors, where there are samples, and over what is in sight."""
-        found = readings(self.scene, self.plots, self._at, self._window, self._seconds)
-        if found is not None:
-            self.measuring.show_readings(found.a_s, found.b_s, self._active, found.rows)
 
     # --- what is said
 

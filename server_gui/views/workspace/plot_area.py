@@ -54,6 +54,15 @@ class PlotArea(QFrame):
         self.below.hide()
         self.setAcceptDrops(True)
 
+    @property
+    def plots(self) -> list[UnitPlot]:
+        """Those over time."""
+        return [card for card in self.cards if isinstance(card, UnitPlot)]
+
+    def in_sight(self, seconds: float) -> tuple[float, float]:
+        """Return the part of the last `seconds` that is in sight, s until the newest row."""
+        return self.plots[0].plot.window_s if self.plots else (-seconds, 0.0)
+
     def offer_below(self, wanted: bool) -> None:
         """Offer room below the lowest plot, to drop a curve there."""
         self.below.setVisible(wanted and bool(self.cards))
