@@ -55,6 +55,7 @@ class Docks(QObject):
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
         self._is_held, self._held = False, list[QDockWidget]()
+        self._gave_way: list[QDockWidget] = []
         self._size()
         self._usual = self._roomy = window.saveState(LAYOUT)
         for one in {window, *(around for part in uncovered for around in _within(part, window))}:
@@ -64,6 +65,7 @@ class Docks(QObject):
     def state(self) -> QByteArray:
         """State to be saved."""
         self.hold_back(is_held=False)  # that is not what people have arranged
+        self.come_back()
         return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
 
     def restore(self, state: QByteArray) -> None:
@@ -76,6 +78,7 @@ class Docks(QObject):
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
+        self._gave_way = []
         self._roomy = self._usual
         self.restore(self._usual)
         for dock in shown:
@@ -89,7 +92,20 @@ class Docks(QObject):
         again = [] if in_sight else self._put_away or self.all[:-1]
         for dock in in_sight or again:
             dock.setVisible(not in_sight)
-        self._put_away = in_sight
+        self._put_away = [*in_sight, *self._gave_way]
+        self._gave_way = []
+
+    def give_way(self, dock: QDockWidget) -> None:
+        """Hide one whose room is needed, until `come_back`; who asks for it meanwhile sees it."""
+        if dock in self._in_sight and not self.is_narrow:  # there it takes no room of its own
+            dock.hide()
+            self._gave_way.append(dock)
+
+    def come_back(self) -> None:
+        """Show again what has given way."""
+        for dock in self._gave_way:
+            dock.show()
+        self._gave_way = []
 
     def hold_back(self, *, is_held: bool) -> bool:
         """Hide them as long as there is nothing for them to show; return whether they are shown again."""
@@ -97,7 +113,8 @@ class Docks(QObject):
             return False
         self._is_held = is_held
         if is_held:
-            self._held = self._in_sight
+            self._held = [*self._in_sight, *self._gave_way]
+            self._gave_way = []
         for dock in self._held:
             dock.setVisible(not is_held)
         if not is_held:
@@ -133,6 +150,7 @@ class Docks(QObject):
         was_held = self._is_held
         if self.has_room is self.is_narrow:
             self.hold_back(is_held=False)
+            self.come_back()
             self.is_narrow = not self.has_room
             if self.is_narrow:
                 self._roomy = self._window.saveState(LAYOUT)

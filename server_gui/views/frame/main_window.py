@@ -152,6 +152,7 @@ class MainWindow(QMainWindow):
         for bar in (self.trial, self.parameters.trial):
             bar.compare.connect(lambda station: self.tabs.edits.compare(station))
         self._pages.addWidget(self.tabs)
+        self.tabs.currentChanged.connect(self._share_room)
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
@@ -224,6 +225,13 @@ class MainWindow(QMainWindow):
         now.offer(not is_seen(self.parameters.trial))
         self.experiment.refresh()
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
+
+    def _share_room(self) -> None:
+        """Give the room of the parameters to pages that are not of a robot, unless these are worked at."""
+        if self.tabs.is_of_a_robot:
+            self._panels.come_back()
+        elif not self.parameters.is_in_use:
+            self._panels.give_way(self.docks[1])
 
     def _offer_stop_all(self) -> None:
         """Have it in sight beside the pages where the one below the robots is not, or is cut."""

@@ -120,6 +120,16 @@ class ParametersPanel(QWidget):
         elif self.pages.currentIndex() == STORE:
             self.storing.refresh()
 
+    @property
+    def is_in_use(self) -> bool:
+        """Whether something is staged, reviewed, written or on trial, or what came of it is to be read."""
+        station = self._desk.selected
+        if station is None:
+            return False
+        staged, writing = station.difference(self._desk.shown.units), station.writing
+        is_over = writing.state in (WriteState.IDLE, WriteState.DONE) and writing.trial is None
+        return bool(staged) or self.pages.currentIndex() != EDIT or not is_over
+
     def be_short(self, is_short: bool) -> None:
         """Put what is done seldom behind one button, where there is little room."""
         self.more.setVisible(is_short)
