@@ -32,6 +32,9 @@ _WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time
 
 
+OBJECT: Final = "object/"  # begins the keys of a session's set-up that tell each parameter's object and unit
+
+
 class SessionPiece(NamedTuple):
     """A part of a session's telemetry: from when to when, and which stamps, as far as that is known."""
 
@@ -79,6 +82,15 @@ class Session(msgspec.Struct, frozen=True):
     units: dict[str, Any] = {}
     versions: dict[str, Any] = {}
     setup: dict[str, Any] = {}
+
+    @property
+    def parameter_units(self) -> dict[str, str]:
+        """SI unit of each parameter ("" has none), as far as the robot has told it."""
+        return {
+            key.removeprefix(OBJECT): str(said).partition(" ")[2]
+            for key, said in self.setup.items()
+            if key.startswith(OBJECT)
+        }
 
     @property
     def length(self) -> timedelta:

@@ -360,15 +360,13 @@ def test_both_tabs_are_drawn_dark_and_light_and_everything_in_reach_has_a_name(
 
 def test_what_a_recording_began_with_is_in_the_window_s_units(archive: Archive, bench: Bench) -> None:
     held = {"gait.step_length": 0.4300000131, "gait.trunk_angle": None, "gone.gain": 2.0}
-    assert archive.held_then(Session("exo-01", "s", parameters=held)) == [
-        "gait.step_length = 430 mm",
-        "gone.gain = 2 (SI)",
-    ]
+    walk = Session("exo-01", "s", parameters=held, setup={"object/gait.step_length": "gait m"})
+    assert archive.held_then(walk) == ["gait.step_length = 430 mm", "gone.gain = 2 (SI)"]
     bench.desk.shown.change(Units(by_si={"m": "m"}))
-    assert archive.held_then(Session("exo-01", "s", parameters=held))[0] == "gait.step_length = 0.43 m"
-    assert archive.held_then(Session("elsewhere", "s", parameters=held))[0] == "gait.step_length = 0.43 (SI)"
+    assert archive.held_then(walk)[0] == "gait.step_length = 0.43 m"
+    assert archive.held_then(msgspec.structs.replace(walk, setup={}))[0] == "gait.step_length = 0.43 (SI)"
     zero = {"gait.step_length": 0.0, "gone.gain": 0}
-    assert archive.held_then(Session("exo-01", "s", parameters=zero)) == [
+    assert archive.held_then(msgspec.structs.replace(walk, parameters=zero)) == [
         "gait.step_length = 0 m",
         "gone.gain = 0 (SI)",
     ]

@@ -63,7 +63,9 @@ def test_what_is_worked_at_stays(wide: MainWindow, bench: Bench, begin: str) -> 
 ASKS: dict[str, Callable[[MainWindow], object]] = {
     "by its name": lambda window: window.docks[PARAMETERS].toggleViewAction().trigger(),
     "to find one": lambda window: window._find(),
-    "for all, by hiding the others first": lambda window: [press() for press in [window._panels.put_away] * 2],
+    "for all, by hiding the others first": lambda window: [
+        press() for press in [window._panels.put_away] * 2
+    ],
 }
 
 

@@ -3,18 +3,23 @@
 import msgspec
 import pytest
 
+from gateway.units import Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.comparison import NOT_THE_CAUSE, ComparisonPage
 from server_gui.views.recordings.panel import CHANGED, LIST
 from tests.gui.archives import ADA, Shown, record
+from tests.gui.fakes import Bench
 
 
 def compared(shown: Shown, settings: ServerSettings) -> ComparisonPage:
     """Two recordings, of which the second has another gain and tells no firmware."""
-    setup = {"component/left_knee": "joint", "firmware/left_knee": "1.2"}
-    record(settings, facts=msgspec.structs.replace(ADA, parameters={"left_knee.gain": 2.0}, setup=setup))
-    record(settings, facts=msgspec.structs.replace(ADA, parameters={"left_knee.gain": 3.0}, operator="Bert"))
+    setup = {"component/left_knee": "joint", "firmware/left_knee": "1.2", "object/gait.step_length": "gait m"}
+    before, after = (
+        {"left_knee.gain": gain, "gait.step_length": step} for gain, step in ((2.0, 0.4), (3.0, 0.43))
+    )
+    record(settings, facts=msgspec.structs.replace(ADA, parameters=before, setup=setup))
+    record(settings, facts=msgspec.structs.replace(ADA, parameters=after, operator="Bert"))
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
@@ -38,14 +43,18 @@ def cells(page: ComparisonPage) -> list[list[str]]:
 
 
 def test_what_changed_is_listed_and_what_is_not_recorded_is_said(
-    shown: Shown, archive: Archive, settings: ServerSettings
+    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
     page = compared(shown, settings)
     shown.until(lambda: archive.compared.moved, "compared both walks")
     assert cells(page) == [
         ["parameter", "left_knee.gain", "2", "3"],
+        ["parameter", "gait.step_length", "400 mm", "430 mm"],
         ["operator", "operator", "Ada", "Bert"],
     ]
+    bench.desk.shown.change(Units(by_si={"m": "cm"}))
+    shown.draw()
+    assert cells(page)[1] == ["parameter", "gait.step_length", "40 cm", "43 cm"]
     assert "left_knee firmware (1.2 before)" in page.unknown.text()
     assert "not recorded in either: wearer, calibration" in page.unknown.text()
     assert NOT_THE_CAUSE in page.verdict.text()

@@ -3,6 +3,7 @@
 import functools
 from pathlib import Path
 
+from gateway.units import Units
 from ml.store.sessions import Session
 from server_gui.core.archive.collected_journals import KeptJournals
 from server_gui.core.archive.label_hits import LabelHits
@@ -98,19 +99,13 @@ class Archive:
         return {*self.settings.robots, *(station.name for station in self._desk)}
 
     @property
-    def shown_units(self) -> object:
+    def shown_units(self) -> Units:
         """Another one where people have chosen other units."""
         return self._desk.shown.units
 
     def held_then(self, session: Session) -> list[str]:
-        """Return the parameters that it began with, in the window's units.
-
-        In SI where the robot is not there.
-        """
-        found = (station.robot.description for station in self._desk if station.name == session.robot)
-        described = next((one for one in found if one is not None), None)
-        si = {} if described is None else {one.name: one.unit for one in described.parameters}
-        said = []
+        """Return the parameters that it began with, in the window's units; in SI where it tells none."""
+        si, said = session.parameter_units, []
         for name, value in session.parameters.items():
             if value is not None and name in si:
                 unit = unit_of(name, si[name], self._desk.shown.units)

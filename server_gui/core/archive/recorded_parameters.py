@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.wire.parameter import ParameterInfo, ParameterValue
+from ml.store.sessions import OBJECT
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.recording.batching import EventKind
 
-OBJECT: Final = "object/"  # begins the keys of a session's setup that tell each parameter's object and unit
 AFTER: Final = frozenset({"write done", "trial begun"})
 BEFORE: Final = frozenset({"taken back", "write taken back"})
 UNKNOWN: Final = frozenset({"ROLL-BACK FAILED", "NOT TAKEN BACK yet", "claimed by the stop"})

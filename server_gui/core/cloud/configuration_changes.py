@@ -7,9 +7,10 @@ unchanged.
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from ml.store.labels import wearer
 from ml.store.sessions import Session
@@ -66,13 +67,18 @@ _TITLES: Final = {
 
 
 class Difference(Struct, frozen=True):
-    """One thing that was otherwise; both in words."""
+    """One thing that was otherwise; both in words.
+
+    Those of a parameter whose `unit` (SI) is recorded end with it, and `numbers` are its two values.
+    """
 
     kind: ChangeKind
     what: str
     before: str
     after: str
     size: float = 0.0  # of numbers: |after − before| in shares of the larger
+    unit: str | None = None
+    numbers: tuple[int | float, int | float] | None = None
 
 
 class Changes(Struct, frozen=True):
@@ -104,7 +110,8 @@ class SessionConfiguration(Struct, frozen=True):
 
 def changes(before: SessionConfiguration, after: SessionConfiguration) -> Changes:
     """Return the differences between two sessions."""
-    found = [one for pair in _facts(before, after) for one in _compared(*pair)]
+    units = before.session.parameter_units | after.session.parameter_units
+    found = [_with_unit(one, units) for pair in _facts(before, after) for one in _compared(*pair)]
     known = [one for one in found if NOT_RECORDED not in (one.before, one.after)]
     differ = [one for one in known if one.before != one.after]
     order = list(ChangeKind)
@@ -172,15 +179,29 @@ def _compared(
         said = [missing if value is None else _said(value) for value in (old, new)]
         if said[0] == said[1] and old != new:  # alike in few digits only: not the same
             said = [repr(value) for value in (old, new)]
-        yield Difference(kind, title.format(name), said[0], said[1], _size(old, new))
+        numbers = (old, new) if _is_number(old) and _is_number(new) else None
+        yield Difference(kind, title.format(name), said[0], said[1], _size(old, new), numbers=numbers)
+
+
+def _with_unit(one: Difference, units: Mapping[str, str]) -> Difference:
+    """Return it with its unit, where it is of a parameter that has one."""
+    if one.kind is not ChangeKind.PARAMETER or one.what not in units or one.numbers is None:
+        return one
+    unit = units[one.what]
+    before, after = (f"{said} {unit}".rstrip() for said in (one.before, one.after))
+    return replace(one, before=before, after=after, unit=unit)
 
 
 def _said(value: object) -> str:
     return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
 
 
+def _is_number(value: object) -> TypeGuard[int | float]:
+    return isinstance(value, int | float)
+
+
 def _size(old: object, new: object) -> float:
-    if not isinstance(old, int | float) or not isinstance(new, int | float) or old == new:
+    if not _is_number(old) or not _is_number(new) or old == new:
         return 0.0
     share = abs(new - old) / max(abs(new), abs(old))
     return share if math.isfinite(share) else 1.0

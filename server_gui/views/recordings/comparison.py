@@ -17,10 +17,12 @@ from PySide6.QtWidgets import (
 
 from gateway.amounts import counted
 from gateway.plain_text import plain
+from gateway.units import Units
 from server_gui.core.archive.archive import Archive
-from server_gui.core.cloud.configuration_changes import Changes, not_known
+from server_gui.core.cloud.configuration_changes import Changes, Difference, not_known
 from server_gui.core.evidence.comparison import Evidence, Measured, Word
 from server_gui.core.evidence.wording import interval, number, share
+from server_gui.core.tuning.edits import brief, unit_of
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -44,7 +46,7 @@ class ComparisonPage(QWidget):
         super().__init__()
         self._archive = archive
         self._theme = theme
-        self._revision = -1
+        self._shown: object = None
         back = QPushButton("Back")
         back.setShortcut("Esc")
         back.clicked.connect(self.left)
@@ -72,9 +74,10 @@ class ComparisonPage(QWidget):
     def refresh(self) -> None:
         """Show what is known by now."""
         compared = self._archive.compared
-        if compared.pair is None or compared.revision == self._revision:
+        shown = compared.revision, self._archive.shown_units
+        if compared.pair is None or shown == self._shown:
             return
-        self._revision = compared.revision
+        self._shown = shown
         before, after = compared.pair
         set_text(self.title, f"From {before.session} of {before.robot} to {after.session} of {after.robot}")
         self._show_changes(compared.changes, compared.problem)
@@ -82,7 +85,7 @@ class ComparisonPage(QWidget):
 
     def _show_changes(self, found: Changes | None, problem: str) -> None:
         rows = () if found is None else found.differences
-        cells = [(str(one.kind), one.what, one.before, one.after) for one in rows]
+        cells = [(str(one.kind), one.what, *in_units(one, self._archive.shown_units)) for one in rows]
         _fill(self.changed, cells)
         self.changed.setVisible(bool(cells))
         if found is None:
@@ -112,6 +115,17 @@ class ComparisonPage(QWidget):
             if (count := sum(one.word is word for one in found.metrics))
         )
         set_text(self.verdict, f"{found.word} · {cycles}{notes} · {' · '.join(others)}\n{NOT_THE_CAUSE}")
+
+
+def in_units(one: Difference, units: Units) -> tuple[str, str]:
+    """Return both values as the window shows them: those of a parameter in its unit there."""
+    if one.numbers is None or one.unit is None:
+        return one.before, one.after
+    unit = unit_of(one.what, one.unit, units)
+    before, after = (brief(unit, value) for value in one.numbers)
+    if before == after:  # alike in these digits
+        before, after = (unit.editable(value) for value in one.numbers)
+    return f"{before} {unit.symbol}".rstrip(), f"{after} {unit.symbol}".rstrip()
 
 
 def _cells(one: Measured) -> tuple[str, ...]:

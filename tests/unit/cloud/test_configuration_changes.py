@@ -164,6 +164,16 @@ def test_numbers_that_differ_late_are_not_alike() -> None:
     assert [(one.before, one.after) for one in found.differences] == [("1234567.0", "1234568.0")]
 
 
+def test_a_parameter_is_told_with_its_unit_where_one_of_the_two_tells_it() -> None:
+    told = {**SETUP, "object/gait.step_length": "controller m", "object/left_knee.gain": "0x6072:0"}
+    after = replace(OLD, parameters={"left_knee.gain": 3.0, "gait.step_length": 0.41}, setup=told)
+    gain, length = compared(after).differences
+    assert (length.before, length.after, length.unit, length.numbers) == ("0.4 m", "0.41 m", "m", (0.4, 0.41))
+    assert (gain.before, gain.after, gain.unit) == ("2", "3", "")
+    gone = compared(replace(after, parameters={"left_knee.gain": 2.0})).unrecorded[0]
+    assert (gone.before, gone.after, gone.unit) == ("0.4", "not recorded", None)
+
+
 def test_a_session_without_walking_has_no_verdict() -> None:
     assert moved(walked(cycles()), walked([])).word in (Word.FEW, Word.NO_DATA)
     assert moved(Walk([], (), False), Walk([], (), False)).word in (Word.FEW, Word.NO_DATA)
