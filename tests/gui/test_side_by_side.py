@@ -180,6 +180,14 @@ def test_what_gait_cycles_of_both_say_stands_at_the_plots_of_the_joint(
     shown.draw()
     assert player.beside_bar.cadence.text().startswith("gait cycles of both legs: ")
     assert "too few cycles of one activity" in player.beside_bar.cadence.text(), "of so short a walk"
+    bar, lines = player.beside_bar, []
+    for width in range(700, 1800, 100):
+        shown.window.resize(width, 800)
+        shown.draw()
+        assert bar.said.width() >= min(bar.said.whole_width, bar.width()), "the names of both are in sight"
+        lines.append(bar.said.geometry().right() < bar.cadence.x())
+    assert lines == sorted(lines)
+    assert len({*lines}) == 2, "in one line with the buttons where both have room"
     first = next(one for one in archive.compared.pair or () if one.session != session.session)
     torque = Measured("left_knee.torque_rms", "torque RMS", "N·m", Word.CHANGED, 10, 12, 20.0, 30.0, 10.0)
     archive.compared.moved = replace(moved, metrics=(torque,))

@@ -19,7 +19,7 @@ ALIGN_HINT: Final = "The points of both recordings that are aligned; both play f
 CLOSE_HINT: Final = "Show the first recording alone"
 CURSORS_HINT: Final = "Both recordings and their difference at two cursors, and over the visible span"
 TOOLS_HINT: Final = "The channels, and the tools that arrange and export plots"
-WIDE: Final = 860  # at text of 100 %: names and buttons in one line
+SPACE: Final = 4  # between both
 
 
 class BesideBar(QWidget):
@@ -58,21 +58,27 @@ class BesideBar(QWidget):
         self.close_button.setAccessibleName("Close the second recording")
         set_tip(self.close_button, CLOSE_HINT)
         self.close_button.clicked.connect(self._close)
-        buttons = QHBoxLayout()
+        self._buttons = buttons = QHBoxLayout()
         buttons.addWidget(self.cadence, 1)
         for widget in (PlainLabel("aligned by"), self.by, self.cursors, self.tools, self.close_button):
             buttons.addWidget(widget)
         self._rows = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
         self._rows.setContentsMargins(0, 0, 0, 0)
-        self._rows.setSpacing(4)
+        self._rows.setSpacing(SPACE)
         self._rows.addWidget(self.said, 1)
         self._rows.addLayout(buttons)
         self.hide()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        is_wide = self.width() >= self._theme.px(WIDE)
+        self._share()
+
+    def _share(self) -> None:
+        """Put names and buttons into one line where the names are whole there; the rest is shortened."""
+        names = self.said.whole_width
+        is_wide = self.width() >= names + SPACE + self._buttons.minimumSize().width()
         ways = QBoxLayout.Direction
+        self.said.setMinimumWidth(names if is_wide else 0)
         self._rows.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
 
     def refresh(self) -> None:
@@ -83,6 +89,7 @@ class BesideBar(QWidget):
         if not is_told:
             return
         self.said.say(self._parts())
+        self._share()
         is_there = beside.second.tape is not None
         for widget in (self.by, self.cursors):
             widget.setEnabled(is_there)

@@ -50,8 +50,16 @@ class WrappingLegend(WrappingHeight):
 
     def is_one_line(self, parts: Sequence[tuple[str, str, str]]) -> bool:
         """Return whether all of these have room in one line."""
+        return self._width(parts) <= self.width()
+
+    @property
+    def whole_width(self) -> int:
+        """How wide one line with all that is said is."""
+        return self._width(self._parts)
+
+    def _width(self, parts: Sequence[tuple[str, str, str]]) -> int:
         text = "\N{NO-BREAK SPACE} ".join(f"{glyph} {words}" for _, glyph, words in parts)
-        return self.fontMetrics().horizontalAdvance(text) <= self.width()
+        return self.fontMetrics().horizontalAdvance(text)
 
     def _unbroken(self, glyph: str, text: str) -> str:
         metrics, room = self.fontMetrics(), self.contentsRect().width()
