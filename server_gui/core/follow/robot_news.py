@@ -1,11 +1,12 @@
 """Turns what a robot's state does into news: links, components, drive states, error codes."""
 
+import re
 from typing import Final, Protocol
 
 from drivers.error_codes import error_text
 from gateway.client import ConnectionState
 from server_gui.core.follow.news import NewsKind
-from server_gui.core.follow.robot import Robot
+from server_gui.core.follow.robot import FollowedComponent, Robot
 
 
 class Tell(Protocol):
@@ -16,6 +17,7 @@ class Tell(Protocol):
 
 
 FEW: Final = 2  # drives that are named before their change
+_CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 LINK_WORDS: Final = {
     ConnectionState.CONNECTED: "connected",
     ConnectionState.WAITING: "no link",
@@ -38,6 +40,7 @@ class RobotNews:
         self._parts: dict[str, str] = {}
         self._drives: dict[str, str] = {}
         self._errors: dict[str, float] = {}
+        self._told: dict[str, int] = {}  # code of the fault that is told already, by component
         self._failure: object = None
 
     def look(self, robot: Robot) -> None:
@@ -65,7 +68,9 @@ class RobotNews:
             if part.comes_up:
                 continue
             before = self._parts.get(part.name, "ok")
-            if part.state != before:
+            if part.state == "ok":
+                self._told.pop(part.name, None)
+            if part.state != before and not self._is_told(part):
                 why = f": {part.problem}" if part.problem else ""
                 kind = KINDS.get(part.state, NewsKind.WARNING)
                 self._tell(kind, f"{_spoken(part.name)} {part.state}{why}", part.name)
@@ -107,9 +112,22 @@ class RobotNews:
             if code is None or code == self._errors.get(joint, 0.0):
                 continue
             self._errors[joint] = code
-            if code:
+            if not code:
+                self._told.pop(joint, None)
+            if code and self._told.get(joint) != code:
                 found[joint] = error_text(int(code))
+                self._told[joint] = int(code)
         return found
+
+    def _is_told(self, part: FollowedComponent) -> bool:
+        """Return whether this fault is an event already, by its code; note that it is one now."""
+        found = _CODE.search(part.problem or "") if part.state == "fault" else None
+        if found is None:
+            return False
+        code = int(found[1], 16)
+        is_told = self._told.get(part.name) == code
+        self._told[part.name] = code
+        return is_told
 
 
 def _spoken(name: str) -> str:

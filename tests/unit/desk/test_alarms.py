@@ -290,6 +290,43 @@ def test_a_fault_and_its_error_are_one_event(bench: Bench) -> None:
     assert one.endswith(" (operation enabled → fault)")
 
 
+@pytest.mark.parametrize("first", ["the drive", "the robot's word"])
+def test_what_the_drive_and_the_robot_say_of_one_fault_is_said_once_each_time_it_comes(
+    bench: Bench, first: str
+) -> None:
+    told: list[str] = []
+    news = RobotNews(lambda _kind, text, _about="": told.append(text))
+
+    def row(state: float, code: float) -> None:
+        values: dict[str, list[float | None]] = {"left_knee.state": [state], "left_knee.error_code": [code]}
+        bench.station.take([telemetry([time.monotonic_ns()], values)])
+        news.look(bench.station.robot)
+
+    def word(state: str, problem: str | None = None) -> None:
+        bench.station.take([looked(state=state, problem=problem)])
+        news.look(bench.station.robot)
+
+    def faults(code: str) -> int:
+        return len([text for text in told if code in text])
+
+    in_fault = "the drive is in fault: 0x2310 continuous overcurrent at the output (register: current)"
+    both = [lambda: row(7.0, float(0x2310)), lambda: word("fault", in_fault)]
+    row(4.0, 0.0)
+    for count in (1, 2):
+        for one in both if first == "the drive" else reversed(both):
+            one()
+        assert faults("0x2310") == count
+        row(6.0, 0.0)  # cleared, whether or not the robot has had time to say so
+        if count == 1 and first == "the drive":
+            continue
+        word("ok")
+    word("fault", in_fault.replace("0x2310", "0x4210"))
+    assert faults("0x4210") == 1
+    word("ok")
+    word("fault", "its values cannot be: no code")
+    assert faults("no code") == 1
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
