@@ -210,7 +210,8 @@ class App:
         link = CommandLink(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         is_named = name not in (name_of(str(address)), OWN)
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
-        station.is_overloaded, station.is_full = self._own_load.is_overloaded, self._own_load.is_full
+        station.is_overloaded = self._own_load.is_overloaded
+        station.is_full = lambda: self._own_load.is_full() or self.desk.frames.is_slow()
         station.predictions.off = not self._predicts
         station.predictions.foresees = self._foresees
         self._mailboxes[name], self._stations[name] = mailbox, station

@@ -133,7 +133,7 @@ def test_what_is_not_known_is_no_card_and_no_zero(view: BusHealthView, bench: Be
 def test_the_last_line_has_the_worst_bus(bar: StatusBar, bench: Bench) -> None:
     bar.refresh()
     assert bar.bus.text() == "bus not known"
-    assert bar.computer.text() == "CPU – · memory –"
+    assert bar.computer.text() == "robot CPU – · memory –"
     bench.station.take([BusesSeen((replace(BUS, load_percent=100.0),), time.monotonic_ns())])
     bar.refresh()
     assert bar.bus.text() == "CAN main 100 %, 4 errors: it is full · 89 % of its frames are from left knee"
@@ -275,7 +275,9 @@ def test_few_frames_a_second_are_a_busy_computer_on_the_last_line(
     bar: StatusBar, bench: Bench, apart_s: float, said: tuple[str, ...]
 ) -> None:
     """It said 0 fps, and nothing of the computer."""
-    bar._frames.extend(apart_s * place for place in range(20))
+    bench.station.is_full = bench.desk.frames.is_slow
+    for place in range(20):
+        bench.desk.frames.count(apart_s * place)
     bar.resize(1366, bar.height())
     bar.refresh()
     assert all(word in bar._window._wordings[0] for word in said)

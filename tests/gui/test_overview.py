@@ -279,7 +279,7 @@ def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
     shown = cells(JointModel(bench.desk, theme), 1)
     assert shown[ERROR] == "0x2310 continuous overcurrent at the output"
     assert shown[TORQUE] == "0.00 / 80"
-    assert shown[2] == "0.0 / –"
+    assert shown[2] == "0.0 / off", "it goes to no target"
     assert cells(JointModel(bench.desk, theme), 0)[ERROR] == "–"
 
 

@@ -202,7 +202,7 @@ def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> N
         keeper.answer = answer
         recording._asked_ns = None
         recording.look()
-    assert [item.text for item in news.items] == [f"over after 1 s: {FULL.text}", FULL.text]
+    assert [item.text for item in news.items] == [f"trouble ended after 1 s: {FULL.text}", FULL.text]
     assert recording.said(ADDRESS).tone is Tone.GOOD
 
 
@@ -212,7 +212,7 @@ def test_a_spool_that_can_be_read_again_is_said_to_be_so_with_how_long_it_was_no
     recording, news = looked(keeper)
     keeper.answer, recording._asked_ns = report(), None
     recording.look()
-    assert news.items[0].text == "over after 1 s: the spool /spool can be read again"
+    assert news.items[0].text == "trouble ended after 1 s: the spool /spool can be read again"
     assert (news.items[0].kind, news.items[1].kind) == (NewsKind.STATE, NewsKind.WARNING)
 
 

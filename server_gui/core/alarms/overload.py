@@ -44,18 +44,16 @@ def is_common(alarms: Iterable[Alarm], parts: int) -> bool:
     return 2 * sum(one.kind in PARTS for one in alarms) >= parts
 
 
-def load_first(
-    alarms: Iterable[Alarm], first: tuple[str, ...], parts: int, *, wired: bool = True
-) -> Iterator[Alarm]:
+def load_first(alarms: Iterable[Alarm], first: tuple[str, ...], parts: int) -> Iterator[Alarm]:
     """Yield the alarms; of what is silent or stale the overloaded computers are checked first.
 
     Not of what is unplugged: no load takes a port away. Nor, where most of so many `parts` are well, of those
-    that are not: a load makes all of them late, so it is named after their own cable, where they have one
-    (`wired`). What an alarm says itself of the robot's computer is not said again.
+    that are not: a load makes all of them late, so it is named after what they alone may have. What an alarm
+    says itself of the robot's computer is not said again.
     """
     found = list(alarms)
     late = [one for one in found if one.kind in SILENT | BUSES and not is_unplugged(one)]
-    is_of_all = not wired or is_common(late, parts)
+    is_of_all = is_common(late, parts)
     every = first
     for one in found:
         first = tuple(said for said in every if said != THEIRS or THEIR_LOAD not in one.what)
@@ -64,7 +62,7 @@ def load_first(
             yield one
         elif one.kind in PARTS and not is_of_all:
             also = (text.replace(" first", "") for text in first)
-            yield dataclasses.replace(one, check=ALSO.join(filter(None, (one.check, *also))))
+            yield dataclasses.replace(one, check=ALSO.join(filter(None, (_besides(one.check), *also))))
         else:
             yield dataclasses.replace(one, check="; then ".join(filter(None, (*first, _besides(one.check)))))
 

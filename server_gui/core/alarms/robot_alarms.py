@@ -20,7 +20,7 @@ from server_gui.core.alarms.drive_states import FAULTY, device_of, drives_did, l
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of_missed, silent_nodes
-from server_gui.core.alarms.simulated import is_simulated, without_wires
+from server_gui.core.alarms.simulated import without_wires
 from server_gui.core.alarms.stop_alarms import stop_alarms
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.alarms.undriven import undriven
@@ -70,7 +70,7 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
     first = overloaded(facts.robot, is_ours=facts.is_overloaded)
     told = without_wires(map(_in_one_line, _found(facts)), facts.robot)
-    return load_first(told, first, len(facts.robot.parts), wired=not is_simulated(facts.robot))
+    return load_first(told, first, len(facts.robot.parts))
 
 
 def _in_one_line(alarm: Alarm) -> Alarm:

@@ -11,6 +11,7 @@ from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import LEFT, Kind
 from server_gui.core.cloud.store_reach import StoreReach
+from server_gui.core.desk.frame_rate import FrameRate
 from server_gui.core.desk.left import Left, left_alarm
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
@@ -44,6 +45,7 @@ class Desk:
         self.stations: list[Station] = []
         self.selected: Station | None = None
         self.news = News()
+        self.frames = FrameRate()  # of the window
         self._alarms = Alarms()
         self._left: dict[tuple[Kind, str], Left] = {}
         self._stop_all: StopAll | None = None  # the latest, while one of its robots is not reset

@@ -406,7 +406,7 @@ class Recording:
         """Tell that a trouble is over, and how it is again."""
         since_s = self._since_s.pop(text, None)
         after = "" if since_s is None else f" after {max(1.0, time.monotonic() - since_s):.0f} s"
-        self._news.add(NewsKind.STATE, WHO, f"over{after}: {AS_BEFORE.sub(AGAIN_SO, text)}")
+        self._news.add(NewsKind.STATE, WHO, f"trouble ended{after}: {AS_BEFORE.sub(AGAIN_SO, text)}")
 
     def _failed(self, keeper: Keeper, error: Exception) -> None:
         if keeper is not self._keeper:

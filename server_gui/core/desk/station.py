@@ -86,7 +86,7 @@ class Station:
         self.is_named = is_named  # by the user, who is to find that name everywhere
         self.address = address
         self.is_overloaded: Callable[[], bool] = lambda: False  # this computer
-        self.is_full: Callable[[], bool] = lambda: False  # this computer, for some seconds
+        self.is_full: Callable[[], bool] = lambda: False  # this computer, for seconds, or its window is slow
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
@@ -185,10 +185,10 @@ class Station:
         """How it is, in one mark and word: the same wherever it is shown."""
         return worst(self.robot, self.alarms, self.stopping)
 
-    def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
-        """Note something about this robot, or about a component of it."""
+    def tell(self, kind: NewsKind, text: str, about: str = "", ago_s: float = 0.0) -> None:
+        """Note something about this robot, or about a component of it, which was so long ago."""
         title = "" if self.robot.description is None else self.title
-        self.news.add(kind, self.name, text, about, title)
+        self.news.add(kind, self.name, text, about, title, ago_s)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""

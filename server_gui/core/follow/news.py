@@ -66,9 +66,14 @@ class News:
         self.items: collections.deque[Item] = collections.deque()
         self.revision = 0
 
-    def add(self, kind: NewsKind, robot: str, text: str, about: str = "", title: str = "") -> None:
-        """Note something; what is told again within a minute is counted, what has not changed is not told."""
-        item = Item(time.time(), kind, robot, text, about=about, title=title)
+    def add(
+        self, kind: NewsKind, robot: str, text: str, about: str = "", title: str = "", ago_s: float = 0.0
+    ) -> None:
+        """Note something that happened so long ago, in its place among the others.
+
+        What is told again within a minute is counted, what has not changed is not told.
+        """
+        item = Item(time.time() - ago_s, kind, robot, text, about=about, title=title)
         is_deed = kind in DONE  # which is told each time
         if not is_deed and self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
             return
@@ -77,7 +82,8 @@ class News:
             self.items.remove(before)
             first_s = before.utc_s if before.first_s is None else before.first_s
             item = dataclasses.replace(item, count=before.count + 1, first_s=first_s)
-        self.items.appendleft(item)
+        newer = (place for place, one in enumerate(self.items) if one.utc_s <= item.utc_s)
+        self.items.insert(next(newer, len(self.items)) if ago_s else 0, item)
         if len(self.items) > KEPT:
             self._forget_one()
         self.revision += 1

@@ -12,7 +12,7 @@ from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.names import class_name
 from server_gui.core.prediction.state import TOO_LITTLE, WITHIN_DAYS, Quality
 
-OTHERS: Final = "other sessions"  # the verdict where each was judged by its own
+OTHERS: Final = "not comparable"  # the verdict where each was judged by its own
 UNKNOWN: Final = "not labelled"
 PLACES: Final = 1  # of a percentage for people
 ALIKE: Final = 0.05  # percent: a difference that is not shown is none

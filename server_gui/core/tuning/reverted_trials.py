@@ -1,8 +1,8 @@
 """Reverted trials: reported once the old values have been read back, not before."""
 
 import time
-from collections.abc import Callable, Mapping
-from typing import Final
+from collections.abc import Mapping
+from typing import Final, Protocol
 
 from gateway.wire.method import Number
 from server_gui.core.follow.news import NewsKind
@@ -14,10 +14,17 @@ OVER: Final = "the trial's time is over"
 OTHERS: Final = "taken back, but other values are held: look at them"
 
 
+class Tell(Protocol):
+    """Function that reports news, of what was so long ago."""
+
+    def __call__(self, kind: NewsKind, text: str, *, ago_s: float = 0.0) -> None:
+        """Tell it."""
+
+
 class RevertedTrials:
     """Reverted trials of one robot; `tell` reports their results."""
 
-    def __init__(self, robot: Robot, writing: WriteProgress, tell: Callable[[NewsKind, str], None]) -> None:
+    def __init__(self, robot: Robot, writing: WriteProgress, tell: Tell) -> None:
         self._robot = robot
         self._writing = writing
         self._tell = tell
@@ -64,7 +71,7 @@ class RevertedTrials:
         if self._robot.holds(trial.before):
             back = f"{OVER}, the robot has taken it back: {self._writing.held_again(trial.before)}; see Edits"
             self._writing.reverted(back)
-            self._tell(NewsKind.PARAMETER, back)
+            self._tell(NewsKind.PARAMETER, back, ago_s=(now_ns - trial.until_ns) / 1e9)
         else:
             self._writing.trial = None
             self._writing.say(WriteState.UNKNOWN, f"{OVER}, but other values are held: look at them")

@@ -188,7 +188,7 @@ class MainWindow(QMainWindow):
             if self._commissioning.stage is not Stage.NOT_CONFIRMED:  # that somebody has to see
                 self.close()
                 return
-        self._bar.frame()
+        self._desk.frames.count()
         due = self._is_due()
         if due:
             self.tabs.read_now()  # what header, alarms and page say is of the same moment

@@ -1,8 +1,6 @@
 """The last line: the robot's computer and bus, who uses most of it, what is recorded, what STOP is not."""
 
-import collections
 import re
-import time
 from typing import Final
 
 from PySide6.QtCore import QEvent, QSize, Qt
@@ -25,9 +23,6 @@ from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
-FRAMES: Final = 60
-LEAST_FRAMES: Final = 5  # before which nothing is said of the rate: a window that opens is slow
-SLOW_FPS: Final = 8.0  # below which this computer is busy, whatever else it does
 GAP: Final = 8  # between two facts, at text of 100 %
 FRAMES_HINT: Final = (
     "Frames that this window draws a second; while this computer is busy, what is shown is late"
@@ -72,7 +67,6 @@ class StatusBar(QStatusBar):
     def __init__(self, desk: Desk, theme: Theme, commissioning: Commissioning | None = None) -> None:
         super().__init__()
         self._desk, self._commissioning = desk, commissioning
-        self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
         self.computer, self.bus, self.recording = ShrinkingLabel(), ShrinkingLabel(), ShrinkingLabel()
         self._window = ShrinkingLabel()
         self._theme = theme
@@ -95,10 +89,6 @@ class StatusBar(QStatusBar):
             label.ensurePolished()
         QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)
 
-    def frame(self) -> None:
-        """Count a frame that was drawn."""
-        self._frames.append(time.monotonic())
-
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
@@ -109,8 +99,8 @@ class StatusBar(QStatusBar):
         self.bus.say(*dict.fromkeys((*words, re.split("[,:]", words[-1])[0])))
         set_tip(self.bus, words[0])
         self._refresh_recording(station)
-        known, is_full = self._rate(), station is not None and station.is_full()
-        is_busy = is_full or (known is not None and known < SLOW_FPS)
+        frames = self._desk.frames
+        known, is_busy = frames.per_second, frames.is_slow() if station is None else station.is_full()
         rate = "– fps" if known is None else f"{known:.0f} fps" if known >= 1.0 else "<1 fps"
         self._window.say(*(*(f"{busy} · {rate}" for busy in FULL), f"▲ {rate}") if is_busy else (rate,))
         set_tone(self._window, "warn" if is_busy else "")
@@ -156,12 +146,6 @@ class StatusBar(QStatusBar):
         self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)
 
-    def _rate(self) -> float | None:
-        """Return the frames a second of late; None while too few are known."""
-        if len(self._frames) < LEAST_FRAMES:
-            return None
-        return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
-
 
 def _bus(station: Station) -> tuple[Mark, tuple[str, ...]]:
     """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
@@ -187,10 +171,10 @@ def _computer(station: Station) -> tuple[str, ...]:
     """CPU and memory of the robot's computer, and who uses most; the fullest wording first."""
     seen = station.robot.resources
     if seen is None or not station.is_live:
-        return "CPU – · memory –", "CPU –"
+        return "robot CPU – · memory –", "robot CPU –", "CPU –"
     share = "–" if not seen.memory.total else f"{100 * seen.memory.used / seen.memory.total:.0f} %"
     cpu = "–" if seen.cpu.percent is None else f"{seen.cpu.percent:.0f} %"
     most = busiest(station)
-    short = f"CPU {cpu} · memory {share}"
+    short = f"robot CPU {cpu} · memory {share}"
     full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} % of a core",)
-    return *full, short, f"CPU {cpu}"
+    return *full, short, f"robot CPU {cpu}", f"CPU {cpu}"

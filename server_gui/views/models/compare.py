@@ -40,7 +40,7 @@ MARKS: Final = {
     "better": ("▲ better", "good"),
     "worse": ("▼ worse", "bad"),
     "alike": ("= alike", "dim"),
-    OTHERS: ("other sessions", "dim"),
+    OTHERS: ("not comparable", "dim"),
     "": ("", "dim"),
 }
 NARROW: Final = 940  # at text of 100 %: no room for the plot beside the figures

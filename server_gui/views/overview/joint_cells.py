@@ -15,7 +15,7 @@ from server_gui.core.alarms.unconfirmed import enabled_mark
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import FollowedComponent
-from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.stop import StopState, is_off
 from server_gui.views.marks import state_mark
 
 # column → quantity; the SI unit of each
@@ -49,6 +49,7 @@ CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
 NOT_KNOWN: Final = "not known"
+OFF: Final = "off"  # instead of a target
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 
 
@@ -115,13 +116,17 @@ def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     """Return where it is, where it should be, and how far that is apart."""
     unit = unit_of(desk, "position")
     position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
-    text = f"{_text(unit, 'position', position)} / {_text(unit, 'position', target)}"
+    word = station.robot.word(f"{joint}.state")
+    if goes_nowhere := not stale and is_off(word):
+        target = None
+    aim = OFF if goes_nowhere else _text(unit, "position", target)
+    text = f"{_text(unit, 'position', position)} / {aim}"
     beyond = next((one for one in _of_values(station, joint) if one.kind is Kind.BEYOND), None)
     known = "text" if beyond is None else beyond.mark.colour
     if position is None or target is None:
         return Cell(text, "old" if stale or position is None else known)
     off = position - target
-    follows = not stale and station.robot.word(f"{joint}.state") == ENABLED
+    follows = not stale and word == ENABLED
     bar = None if not follows else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
     return Cell(
         text, "old" if stale else known, bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"

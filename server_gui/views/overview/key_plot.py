@@ -119,9 +119,9 @@ class KeyPlot(Card):
         def parts(texts: Collection[str], wording: int, words: Mapping[str, str]) -> list[Part]:
             named, drawn = zip(inks, self._curves, texts, strict=True), "" if words else "━"
             curves = [(ink, drawn, f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
-            bad = css(self._theme, "bad")
+            bad, dim = css(self._theme, "bad"), css(self._theme, "dim")
             lines = [(bad, "┅", f"{of_seen[wording]}{seen}")] if seen else []
-            return [*curves, *lines, *([(bad, "↕", f"{of_beyond[wording]}{beyond}")] if beyond else [])]
+            return [*curves, *lines, *([(dim, "↕", f"{of_beyond[wording]}{beyond}")] if beyond else [])]
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
         wordings: tuple[tuple[int, Mapping[str, str]], ...] = (

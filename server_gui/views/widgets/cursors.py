@@ -93,7 +93,7 @@ class LimitArrows(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._theme.colour("bad"))
+        painter.setBrush(self._theme.colour("dim"))  # no curve is near it
         wide = float(self.width())
         for share in self._beyond:
             tip = share * self.height()

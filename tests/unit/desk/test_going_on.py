@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from gateway.wire.stop import Reset
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.overload import THEIRS, load_first
+from server_gui.core.alarms.overload import ALSO, THEIRS, load_first
 from server_gui.core.alarms.simulated import FAULTS, NO_WIRES, advised, without_wires
 from server_gui.core.alarms.stop_alarms import go_on
 from server_gui.core.alarms.texts import Kind, check_of
@@ -54,7 +54,7 @@ def test_a_simulated_bus_blames_no_wiring_and_a_real_one_does() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kind.PART_STALE, Kind.LOST])
-def test_no_simulated_part_has_a_cable_and_a_load_is_looked_at_first(kind: Kind) -> None:
+def test_no_simulated_part_has_a_cable_and_of_one_alone_a_load_is_looked_at_last(kind: Kind) -> None:
     robot, known = Robot(), described().description
     parts = [replace(one, device={"vendor": "GWRMS"}) for one in known.components]
     alarm = Alarm(kind, "left_knee", "no heartbeat", check="check the node's power and cable")
@@ -63,8 +63,9 @@ def test_no_simulated_part_has_a_cable_and_a_load_is_looked_at_first(kind: Kind)
     robot.apply(Described(replace(known, components=parts)))
     (one,) = without_wires([alarm], robot)
     assert one.check == NO_WIRES
-    (first,) = load_first([one], (THEIRS,), 10, wired=False)
-    assert first.check == f"{THEIRS}; then {FAULTS}"
+    (alone,) = load_first([one], (THEIRS,), 10)
+    assert alone.check == f"{FAULTS}{ALSO}{THEIRS.replace(' first', '')}"
+    assert next(load_first([one], (THEIRS,), 2)).check == f"{THEIRS}; then {FAULTS}", "half of all"
     gone = Alarm(kind, "left_knee", "/dev/pts/3 does not exist", check="plug the device in")
     assert next(without_wires([gone], robot)).check == gone.check
 

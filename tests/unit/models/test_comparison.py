@@ -138,7 +138,7 @@ def test_figures_that_were_judged_by_other_sessions_have_no_difference_and_no_ve
     )
     known = {row.name: row for row in rows(one, other)}
     assert signed(known["F1, mean over classes"].difference) == "–"
-    assert known["F1, mean over classes"].verdict == "other sessions"
+    assert known["F1, mean over classes"].verdict == "not comparable"
     assert {row.difference for row in known.values()} == {None}
     assert known["fall"].verdict == "", "neither has a figure"
 

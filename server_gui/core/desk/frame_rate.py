@@ -1,0 +1,35 @@
+"""How often the window is drawn: where that is seldom, all that is shown is late."""
+
+import collections
+import time
+from typing import Final
+
+KEPT: Final = 60  # frames that are averaged
+LEAST: Final = 5  # before which nothing is said of the rate: a window that opens is slow
+SLOW: Final = 8.0  # frames a second, below which this computer is busy, whatever else it does
+FAST: Final = 10.0  # from which it is not any more, so that no words flicker
+
+
+class FrameRate:
+    """Counts the frames that were drawn."""
+
+    def __init__(self) -> None:
+        self._drawn_s: collections.deque[float] = collections.deque(maxlen=KEPT)
+        self._is_slow = False
+
+    def count(self, now_s: float | None = None) -> None:
+        """Count one that is drawn, at an instant of our monotonic clock."""
+        self._drawn_s.append(time.monotonic() if now_s is None else now_s)
+        rate = self.per_second
+        self._is_slow = rate is not None and rate < (FAST if self._is_slow else SLOW)
+
+    @property
+    def per_second(self) -> float | None:
+        """The rate of late; None while too few are known."""
+        if len(self._drawn_s) < LEAST:
+            return None
+        return (len(self._drawn_s) - 1) / max(self._drawn_s[-1] - self._drawn_s[0], 1e-6)
+
+    def is_slow(self) -> bool:
+        """Return whether so few are drawn that this computer cannot keep up."""
+        return self._is_slow
