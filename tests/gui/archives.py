@@ -21,7 +21,8 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.views.cloud.panel import Cloud
-from server_gui.views.frame.main_window import USUAL, MainWindow
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.on_screen import USUAL
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.refresh_rate import SLOW

@@ -16,7 +16,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.frame.garbage import Garbage
-from server_gui.views.frame.main_window import USUAL, MainWindow
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.on_screen import USUAL
 from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.theme import Look, Theme

@@ -1,25 +1,27 @@
 """Signals are zoomed while they go on, and measured with two cursors, by mouse and by keys."""
 
 import csv
+import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from gateway.units import Units
+from gateway.units import Unit, Units
 from server_gui.core.desk.measuring import Measured, measure, nearest, row_at
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.workspace.measuring import TITLES, Measuring
 from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
-from tests.support.desk import telemetry
+from tests.support.desk import described, telemetry
 
 RATE_HZ = 100
 START_NS = 1_000_000_000_000
@@ -290,8 +292,54 @@ def test_without_data_nothing_is_measured(theme: Theme, bench: Bench) -> None:
     made.cursors.click()
     QTest.keyClick(made.measuring, Qt.Key.Key_Left)
     made.refresh()
-    assert made.measuring.table.rowCount() == 0
+    table = made.measuring.table
+    told = {str(table.item(row, column).text()) for row in range(table.rowCount()) for column in range(1, 8)}  # type: ignore[union-attr]
+    assert told <= {"–"}
     destroy(made)
+
+
+@pytest.mark.parametrize("way", ["another robot", "another start"])
+def test_no_numbers_of_another_robot_or_of_before_its_start_are_left_at_the_cursors(
+    signals: Signals, bench: Bench, way: str
+) -> None:
+    signals.cursors.click()
+    signals.refresh()
+    table = signals.measuring.table
+
+    def told() -> set[str]:
+        texts = (table.item(row, column) for row in range(table.rowCount()) for column in range(1, 8))
+        return {item.text() for item in texts if item is not None}
+
+    assert told() - {"–"}
+    if way == "another robot":
+        other = bench.add("exo-02", 7421)
+        other.take([described("exo-02")])
+        bench.desk.select(other)
+    else:
+        anew = described()
+        bench.station.take([dataclasses.replace(anew, description=replace(anew.description, boot_id="2"))])
+    signals.refresh()
+    signals.read_now()
+    signals.refresh()
+    assert told() <= {"–"}
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "shown", "difference"),
+    [
+        (123456.0, 123464.0, ("123456", "123464"), "8"),
+        (12345.61, 12345.84, ("12346", "12346"), "0.23"),
+        (1.5, 1.5, ("1.5", "1.5"), "0"),
+        (25.1234, 23.8777, ("25.123", "23.878"), "−1.245"),
+    ],
+)
+def test_what_differs_is_never_told_to_be_alike(
+    theme: Theme, a: float, b: float, shown: tuple[str, str], difference: str
+) -> None:
+    made = Measuring(theme)
+    made.show_readings(-2.0, -1.0, 0, [("force", Unit("N", "N"), Measured(a, b))])
+    texts = [str(made.table.item(0, column).text()) for column in (1, 2, 3)]  # type: ignore[union-attr]
+    assert texts == [*shown, difference]
 
 
 def test_where_there_is_no_sample_nothing_is_told() -> None:

@@ -247,22 +247,6 @@ def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, benc
     assert time.time() - told.utc_s == pytest.approx(3.0, abs=1.0), "then it was, and not when that was known"
 
 
-@pytest.mark.parametrize("width", range(310, 500, 20))
-def test_what_writes_is_whole_in_a_review_of_any_width(window: MainWindow, bench: Bench, width: int) -> None:
-    window.resize(1366, 768)
-    bench.look_again([looked()])
-    window.parameters.stage_text("gait.step_length", "430")
-    window.parameters.begin_review()
-    review = window.parameters.review
-    window.resizeDocks([window.docks[1]], [width], Qt.Orientation.Horizontal)
-    bench.draw(window)
-    room = review.parentWidget().rect()
-    assert review.width() <= room.width(), "it is scrolled to the side"
-    for control in (review.try_it, review.seconds, review.write_it):
-        assert control.width() >= control.minimumSizeHint().width()
-        assert control.visibleRegion().boundingRect() == control.rect()
-
-
 def test_a_trial_is_kept_or_taken_back_by_its_number(panel: ParametersPanel, bench: Bench) -> None:
     for ask, answer in (
         (panel.trial.keep, Confirmed(7, {"gait.step_length": 0.43})),

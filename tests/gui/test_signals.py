@@ -208,13 +208,22 @@ def rows_until(bench: Bench, stamp_ns: int) -> None:
     bench.station.take([telemetry(stamps_ns, {"left_knee.position": [0.2] * len(stamps_ns)}, stamp_ns)])
 
 
-def test_the_seconds_after_an_instant_are_shown_as_they_come(signals: Signals, bench: Bench) -> None:
+def test_the_seconds_after_an_instant_are_shown_as_they_come(
+    signals: Signals, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Who asked at once saw half of what was promised, for good."""
     newest_ns = bench.station.rings.newest_ns
     assert newest_ns is not None
     signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
     signals.refresh()
     assert "Paused, up to 5 s more come" in signals.said.text()
+    with monkeypatch.context() as patched:
+        patched.setattr(type(bench.station), "is_live", property(lambda _: False))
+        signals.read_now()
+        signals.refresh()
+        assert signals.said.text().startswith("Paused · ")
+        assert "come" not in signals.said.text()
+        assert " old" in signals.said.text()
     rows_until(bench, newest_ns + 2_000_000_000)
     signals.refresh()
     _left, right = signals.plots[0].plot.window_s

@@ -10,7 +10,8 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QTabBar, QWidget
 
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.frame.main_window import USUAL, MainWindow, opening_size
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.on_screen import USUAL, opening_size
 from server_gui.views.parameters.tree import DEFAULT, RANGE
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme

@@ -66,6 +66,7 @@ from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.writing import WriteProgress, written_line
 
+NOT_DONE: Final = {"keep": "NOT kept", "revert": "NOT taken back"}
 WATCH_NS: Final = 200_000_000  # between looks for news
 
 
@@ -439,17 +440,27 @@ class Station:
     def keep_trial(self) -> None:
         """Make what is on trial stay."""
         if self.writing.trial is not None:
-            self._ask(self._commands.confirm(self.writing.trial.write), lambda _: self._kept(), "keep")
+            self._decide(self._commands.confirm(self.writing.trial.write), lambda _: self._kept(), "keep")
 
     def end_trial(self) -> None:
         """Take back what is on trial, now."""
         if self.writing.trial is not None:
             before = self.writing.trial.before
-            self._ask(
+            self._decide(
                 self._commands.revert(self.writing.trial.write),
                 lambda _: self.reverted.began(before),
                 "revert",
             )
+
+    def _decide(self, future: "Future[Result]", done: Callable[[Result], None], what: str) -> None:
+        """Ask for the end of a trial; where that fails, it is said where its countdown is."""
+        self.writing.asked()
+
+        def failed(error: Exception) -> None:
+            self.tell(NewsKind.WARNING, f"{what}: {error}")
+            self.writing.not_done(NOT_DONE[what], str(error))
+
+        when_done(future, self._deliver, done, failed)
 
     def stage_undo(self) -> None:
         """Stage the inverse of the latest write, to be reviewed and written like any edit."""

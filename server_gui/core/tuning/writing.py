@@ -58,6 +58,8 @@ class WriteProgress:
     said_s: float = 0.0  # when, on our monotonic clock
     rows: dict[str, str] = field(default_factory=dict)
     trial: Trial | None = None
+    failed_ask: str = ""  # what of a trial was asked for and not done: to keep it, or take it back
+    why_failed: str = ""
     undo: collections.deque[Mapping[str, Number]] = field(
         default_factory=lambda: collections.deque(maxlen=UNDO)
     )
@@ -90,6 +92,7 @@ class WriteProgress:
             self._set(WriteState.DONE, f"{_count(len(written.after))} written and read back")
         else:
             until_ns = time.monotonic_ns() + round(written.trial_s * 1e9)
+            self.asked()
             self.trial = Trial(written.write, written.after, written.before, until_ns)
             self._set(WriteState.DONE, "on trial: read back, and in force until it is taken back")
 
@@ -112,6 +115,17 @@ class WriteProgress:
         if self.trial is not None:
             self.undo.append(self.trial.before)
             self._end_trial("kept: the trial's values stay")
+
+    def asked(self) -> None:
+        """Note that a trial is to be kept, or taken back."""
+        self.failed_ask = self.why_failed = ""
+        self.revision += 1
+
+    def not_done(self, what: str, why: str) -> None:
+        """Note that the robot did not, or has not said that it did: the trial goes on, as far as is known."""
+        if self.trial is not None:
+            self.failed_ask, self.why_failed = what, why
+            self.revision += 1
 
     def reverting(self) -> None:
         """Note a revert that the robot reports, before it is read back."""

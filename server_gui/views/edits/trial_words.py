@@ -44,6 +44,8 @@ def so_far(station: Station) -> tuple[str, ...]:
 
     Then the same for where there is less and less room.
     """
+    if station.writing.failed_ask:
+        return (station.writing.why_failed,)
     edit = station.trial_evidence
     if edit is None:
         walks = station.is_live and station.processing.derived().gait.walking
@@ -93,10 +95,13 @@ def verdict_takes(station: Station) -> tuple[str, ...]:
     return f"{said}: {FEWEST} cycles of each leg", said
 
 
-def ends(trial: Trial) -> str:
-    """Return when it goes back."""
-    left_s = trial.left_s()
-    return f"taken back in {left_s:.0f} s" if left_s else "its time is over: reading …"
+def ends(station: Station, trial: Trial) -> str:
+    """Return when it goes back, after what has failed that somebody asked of it."""
+    left_s, failed = trial.left_s(), station.writing.failed_ask
+    end = f"taken back in {left_s:.0f} s" if left_s else "its time is over: reading …"
+    if not left_s and not station.is_linked:
+        end = "its time is over: not known, no link"
+    return f"{failed}; {end}" if failed else end
 
 
 def _changes(station: Station, trial: Trial, units: Units) -> list[tuple[str, str]]:

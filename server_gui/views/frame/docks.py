@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, Qt
+from PySide6.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, QSize, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QTabWidget, QWidget
 
 from server_gui.views.frame.dock_title import DockTitle, HasTools
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.visibility import let_go
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
@@ -54,6 +55,8 @@ class Docks(QObject):
         self.all = [self._dock(title, widget, area) for title, (widget, area) in panels.items()]
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
+        self._is_put_away_for_room = False
+        self._sizes: dict[QDockWidget, QSize] = {}  # in the last frame in which all had room
         self._is_held, self._held = False, list[QDockWidget]()
         self._gave_way: list[QDockWidget] = []
         self._size()
@@ -86,11 +89,23 @@ class Docks(QObject):
         if self.is_narrow:
             self._stack()
 
+    def settle(self) -> None:
+        """Keep how they are arranged, in a frame in which they have room and nobody resizes the window.
+
+        While that is made narrow Qt squeezes them: what is squeezed is not what people have arranged.
+        """
+        if not self.is_narrow and self.has_room and not self._is_held and not self._gave_way:
+            self._roomy = self._window.saveState(LAYOUT)
+            self._sizes = {dock: dock.size() for dock in self._in_sight}
+        for bar in self._window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            bar.setFocusPolicy(Qt.FocusPolicy.TabFocus if bar.count() else Qt.FocusPolicy.NoFocus)
+
     def put_away(self) -> None:
         """Leave all the room to the tabs; or, where that is so, show what was there again."""
         in_sight = self._in_sight
         again = [] if in_sight else self._put_away or self.all[:-1]
         for dock in in_sight or again:
+            let_go(dock)
             dock.setVisible(not in_sight)
         self._put_away = [*in_sight, *self._gave_way]
         self._gave_way = []
@@ -98,6 +113,7 @@ class Docks(QObject):
     def give_way(self, dock: QDockWidget) -> None:
         """Hide one whose room is needed, until `come_back`; who asks for it meanwhile sees it."""
         if dock in self._in_sight and not self.is_narrow:  # there it takes no room of its own
+            let_go(dock)
             dock.hide()
             self._gave_way.append(dock)
 
@@ -111,6 +127,7 @@ class Docks(QObject):
         """Hide them as long as there is nothing for them to show; return whether they are shown again."""
         if is_held is self._is_held:
             return False
+        self.settle()
         self._is_held = is_held
         if is_held:
             self._held = [*self._in_sight, *self._gave_way]
@@ -119,7 +136,7 @@ class Docks(QObject):
             dock.setVisible(not is_held)
         if not is_held:
             self._held = []
-            self._size()
+            self._size_as_before()
         return not is_held
 
     def bring(self, dock: QDockWidget) -> None:
@@ -153,7 +170,6 @@ class Docks(QObject):
             self.come_back()
             self.is_narrow = not self.has_room
             if self.is_narrow:
-                self._roomy = self._window.saveState(LAYOUT)
                 self._stack()
             else:
                 self._unstack()
@@ -166,10 +182,13 @@ class Docks(QObject):
     def _fit_tight(self) -> None:
         """Put them away where they would leave too little room to the tabs, until there is more again."""
         is_tight = self._window.width() < self._theme.px(TIGHT)
-        if is_tight is not self._is_tight:
-            self._is_tight = is_tight
-            if bool(self._in_sight) is is_tight:
-                self.put_away()
+        if is_tight is self._is_tight:
+            return
+        self._is_tight = is_tight
+        is_due = bool(self._in_sight) if is_tight else self._is_put_away_for_room and not self._in_sight
+        self._is_put_away_for_room = is_tight and is_due
+        if is_due:
+            self.put_away()
 
     @property
     def _in_sight(self) -> list[QDockWidget]:
@@ -185,7 +204,12 @@ class Docks(QObject):
         self._panels[dock] = widget
         self._give_title(dock)
         dock.installEventFilter(self)
+        dock.visibilityChanged.connect(lambda on: self._shown(dock) if on else None)
         return dock
+
+    def _shown(self, dock: QDockWidget) -> None:
+        """Note that somebody has asked for what had given way."""
+        self._gave_way = [one for one in self._gave_way if one is not dock]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in MOVES:
@@ -209,6 +233,23 @@ class Docks(QObject):
             y for y in places if y > whole[0].top() and is_free(y)
         ]  # never above: its title could be off the screen
         dock.move(frame.x(), min(free, key=lambda y: (y > lowest, abs(y - frame.y()))))
+
+    def _size_as_before(self) -> None:
+        """As large as people have made them, where all of them have been seen."""
+        if self.is_narrow or not self._sizes:
+            self._size()
+            return
+        beside = Area.LeftDockWidgetArea | Area.RightDockWidgetArea
+        for way, is_beside, size in (
+            (Qt.Orientation.Horizontal, True, QSize.width),
+            (Qt.Orientation.Vertical, False, QSize.height),
+        ):
+            docks = [
+                dock
+                for dock in self._sizes
+                if not dock.isHidden() and bool(self._window.dockWidgetArea(dock) & beside) is is_beside
+            ]
+            self._window.resizeDocks(docks, [size(self._sizes[dock]) for dock in docks], way)
 
     def _size(self) -> None:
         px = self._theme.px

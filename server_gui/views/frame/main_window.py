@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSettings, QSize, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QKeySequence,
@@ -41,6 +41,7 @@ from server_gui.views.frame.empty import EmptyView
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.help import Help
 from server_gui.views.frame.keys_sheet import KeysSheet
+from server_gui.views.frame.on_screen import onto_screen, opening_size
 from server_gui.views.frame.page_bar import PageBar
 from server_gui.views.frame.pages import Pages
 from server_gui.views.frame.recording_chip import ask_recording
@@ -58,19 +59,13 @@ from server_gui.views.robots.stop_all_bar import StopAllBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stop_button import StopButton
-from server_gui.views.widgets.visibility import has_focus_in, is_all_seen, is_seen
+from server_gui.views.widgets.visibility import has_focus_in, is_all_seen
 
 EVENTS: Final = 2  # among the docks
 EVENTS_LIVE: Final = "Events, live"  # beside a recording that is played
 ROBOTS: Final = 9  # that have a key
 ALL_WIDE: Final = 160  # STOP ALL beside the pages, at text of 100 %, at most
 LEAST: Final = 240  # high, at text of 100 %
-USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
-
-
-def opening_size(room: QSize, scale: float) -> QSize:
-    """Return how large a window is that nobody has resized yet: larger text needs more of the screen."""
-    return (USUAL * max(scale, 1.0)).boundedTo(room)
 
 
 class MainWindow(QMainWindow):
@@ -208,6 +203,10 @@ class MainWindow(QMainWindow):
         self.page_bar.setVisible(shown)
         if self._panels.hold_back(is_held=not self._desk.stations):
             self._fit()
+            self._share_room()
+        elif self.parameters.is_in_use:
+            self._panels.come_back()
+        self._panels.settle()
         self.header.refresh()
         self.stopped_all.refresh()
         self.alarms.refresh()
@@ -220,11 +219,10 @@ class MainWindow(QMainWindow):
         self._panels.call(self.docks[EVENTS], EVENTS_LIVE if self.tabs.shows_playback else "Events")
         self._offer_stop_all()
         self._bar.refresh()
-        now = self.tabs.overview.now
-        elsewhere = (self.parameters.trial, now.trial)
-        now.offer(not is_seen(self.parameters.trial))
+        now, is_decided_there = self.tabs.overview.now, self.parameters.trial.can_be_decided
+        now.offer(not is_decided_there)
         self.experiment.refresh()
-        self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
+        self.trial.refresh(shown=not (is_decided_there or now.can_be_decided))
 
     def _share_room(self) -> None:
         """Give the room of the parameters to pages that are not of a robot, unless these are worked at."""
@@ -323,7 +321,7 @@ class MainWindow(QMainWindow):
         if not self._is_arranged:
             self._arrange()
         if self.size() == self._opened_as:
-            self._onto_screen()
+            onto_screen(self)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -343,6 +341,12 @@ class MainWindow(QMainWindow):
         """Words that are typed are seen, also where the panel was hidden."""
         self.bring(self.docks[1])
         self.parameters.find_parameter()
+
+    def _press(self, button: str) -> None:
+        """Press a button of the parameters, and have these in sight with what comes of it."""
+        self.bring(self.docks[1])
+        self.parameters.refresh()
+        getattr(self.parameters, button).click()
 
     def _edit_parameter(self, name: str) -> None:
         self._panels.bring(self.docks[1])
@@ -392,13 +396,15 @@ class MainWindow(QMainWindow):
         """Do with the room that there is."""
         if not self._is_arranged:
             return
-        is_narrow = not self._panels.has_room
-        if is_narrow != self._panels.is_narrow:
+        is_narrow, was_narrow = not self._panels.has_room, self._panels.is_narrow
+        if is_narrow != was_narrow:
             for part in (self.header, self.parameters):
                 part.be_short(is_narrow)
             self.panels_button.setVisible(is_narrow)
             self.page_bar.arrange()  # now: else what is below moves a frame later
         self._panels.fit(scaled=scaled)
+        if is_narrow != was_narrow:
+            self._share_room()
 
     def _hold_header(self) -> None:
         """Keep it as wide as the header, which Qt does not see to, and no larger than the screen."""
@@ -434,6 +440,8 @@ class MainWindow(QMainWindow):
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
         QShortcut(QKeySequence.StandardKey.Find, self, self._find)
         QShortcut(QKeySequence("?"), self, self.keys.turn)
+        for keys, button in (("Ctrl+Return", "review_button"), ("Ctrl+Z", "undo")):
+            QShortcut(QKeySequence(keys), self, lambda button=button: self._press(button))
         QShortcut(QKeySequence("Ctrl+K"), self, lambda: self._end_trial(keep=True))
         QShortcut(QKeySequence("Ctrl+T"), self, lambda: self._end_trial(keep=False))
         for place in range(ROBOTS):
@@ -460,7 +468,7 @@ class MainWindow(QMainWindow):
         geometry = kept_bytes(self.kept, "geometry")
         if geometry is not None:
             self.restoreGeometry(geometry)
-            self._onto_screen()
+            onto_screen(self)
         if not self.isMaximized():
             self._arrange()
 
@@ -476,18 +484,6 @@ class MainWindow(QMainWindow):
             self._panels.restore(state)
         if self.isVisible():
             self._fit(scaled=True)
-
-    def _onto_screen(self) -> None:
-        """Whole on the screen that it is on: of another one it may be too large, or beside this one."""
-        if self.windowState() & (Qt.WindowState.WindowMaximized | Qt.WindowState.WindowFullScreen):
-            return
-        room, frame = self.screen().availableGeometry(), self.frameGeometry()
-        self.resize(self.size().boundedTo(room.size() - frame.size() + self.size()))
-        frame = self.frameGeometry()
-        left = min(max(frame.left(), room.left()), room.right() + 1 - frame.width())
-        top = min(max(frame.top(), room.top()), room.bottom() + 1 - frame.height())
-        if frame.topLeft() != QPoint(left, top):
-            self.move(left, top)
 
 
 def _column(widget: QWidget) -> QVBoxLayout:

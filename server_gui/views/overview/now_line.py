@@ -23,6 +23,7 @@ from server_gui.views.widgets.card import set_primary
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
+from server_gui.views.widgets.visibility import is_all_seen
 
 A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
 BESIDE: Final = 8  # between the words and the detail of one line
@@ -141,6 +142,11 @@ class NowLine(QFrame):
         super().resizeEvent(event)
         self._fit(on_trial=self._placed[1])
 
+    @property
+    def can_be_decided(self) -> bool:
+        """Whether a trial can be kept and taken back here: both buttons are whole in sight."""
+        return is_all_seen(self.keep) and is_all_seen(self.take_back)
+
     def offer(self, wanted: bool) -> None:
         """Choose whether a trial is judged, kept or taken back here: not while its panel is in sight."""
         self._is_offered = wanted
@@ -180,7 +186,7 @@ class NowLine(QFrame):
     def _show_trial(self, station: Station, trial: Trial) -> None:
         units = self._desk.shown.units
         tip = "\n".join(changes(station, trial, units))
-        back = ends(trial)
+        back = ends(station, trial)
         seen = tuple(f"{back}; {words}" for words in so_far(station))
         self.trial.say(ON_TRIAL, wordings(station, trial, units), (*seen, back), tip)
         why_not = why_no_ab(trial)

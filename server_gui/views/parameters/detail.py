@@ -21,6 +21,8 @@ from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
+CHOOSE: Final = "Choose a parameter above; F2 or typing edits it."
+NOT_THERE: Final = "Nothing is known of it at this robot."
 MOST_FACTS: Final = 2  # where there is the least room; the tip has all
 BAR_SHARE: Final = 9  # of the title's line, where the limits' bar stands in it
 SEVERAL: Final = "The same for other joints: one change, reviewed, written and reverted as a whole"
@@ -82,7 +84,7 @@ class Detail(Card):
         self._below.addWidget(self.range, 1)
         self._below.addWidget(self._several)
         self.body.addLayout(self._below)
-        self._facts = PlainLabel("Choose a parameter above; F2 or typing edits it.")
+        self._facts = PlainLabel(CHOOSE)
         self._facts.setObjectName("dim")
         self._facts.setWordWrap(True)
         set_tip(self._facts, f"Stored: {RULE}")
@@ -111,6 +113,7 @@ class Detail(Card):
             widget.setEnabled(info is not None)
         self.setVisible(info is not None or not self._is_short)
         if station is None or info is None:
+            self._show_none()
             return
         unit = unit_of(info.name, info.unit, self._desk.shown.units)
         held, staged = station.robot.parameters.get(info.name), station.edits.staged.get(info.name)
@@ -138,13 +141,28 @@ class Detail(Card):
         set_tip(self._facts, f"{facts}\nStored: {RULE}")
         set_text(self._facts, "\n".join(filter(None, (problem, known))) if self._is_short else facts)
 
+    def _show_none(self) -> None:
+        """Show no value: none is chosen, or nothing is known of it at this robot."""
+        self.set_title(self._name or "No parameter chosen")
+        for part, text in ((self._unit, ""), (self._facts, NOT_THERE if self._name else CHOOSE)):
+            set_text(part, text)
+        set_tip(self._facts, "")
+        self.field.clear()
+        self.range.show_range(None)
+        self._range = None
+        self._several.setEnabled(False)
+        self._place(0)
+
     def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:
         self._range = reach(info, current)
-        self.slider.setEnabled(self._range is not None and info.live)
-        if self._range is None or value is None or self.slider.isSliderDown():
-            return
-        low, high = self._range
-        place = round((value - low) / (high - low) * STEPS)
+        self.slider.setEnabled(self._range is not None and info.live and value is not None)
+        if self._range is None or value is None:
+            self._place(0)
+        elif not self.slider.isSliderDown():
+            low, high = self._range
+            self._place(round((value - low) / (high - low) * STEPS))
+
+    def _place(self, place: int) -> None:
         self.slider.blockSignals(True)
         self.slider.setValue(min(max(place, 0), STEPS))
         self.slider.blockSignals(False)

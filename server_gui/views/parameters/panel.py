@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -260,8 +260,6 @@ class ParametersPanel(QWidget):
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self.review_button = QPushButton("Review …")
         self.review_button.setObjectName("primary")
-        QShortcut(QKeySequence("Ctrl+Return"), self, self.review_button.click)  # its own goes with its text
-        self.undo.setShortcut("Ctrl+Z")
         self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
         self._compare.setToolTip(
             "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"

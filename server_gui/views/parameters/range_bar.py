@@ -1,6 +1,7 @@
 """A parameter's limits as a bar: from where to where, how far one write goes, what is held and staged."""
 
 from collections.abc import Callable
+from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
@@ -13,6 +14,7 @@ from server_gui.core.tuning.edits import brief
 from server_gui.views.theme import Theme
 
 HIGH = 5.0  # pixels of the bar
+NO_UNIT: Final = Unit("", "")
 
 
 class RangeBar(QWidget):
@@ -34,14 +36,14 @@ class RangeBar(QWidget):
 
     def show_range(
         self,
-        info: ParameterInfo,
-        unit: Unit,
-        held: Number | None,
-        staged: float | None,
-        reach: tuple[float, float] | None,
+        info: ParameterInfo | None,
+        unit: Unit = NO_UNIT,
+        held: Number | None = None,
+        staged: float | None = None,
+        reach: tuple[float, float] | None = None,
     ) -> None:
         """Show these, in `unit`; values are SI."""
-        if info.min is None or info.max is None or reach is None:
+        if info is None or info.min is None or info.max is None or reach is None:
             shown, figures = None, ("", "")
         else:
             shown = float(info.min), float(info.max), reach, None if held is None else float(held), staged

@@ -10,8 +10,9 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.trial_words import TO_AB, changes, ends, is_judged, so_far, why_no_ab, wordings
-from server_gui.views.widgets.card import set_primary, set_text
+from server_gui.views.widgets.card import set_primary, set_text, set_tone
 from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.visibility import is_all_seen
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
@@ -49,7 +50,7 @@ class TrialBar(QFrame):
         self._bar.setTextVisible(False)
         self._bar.setAccessibleName("Time left of the trial")
         keep, back = QPushButton("Keep it"), QPushButton("Take it back now")
-        self._keep = keep
+        self._keep, self._back = keep, back
         keep.clicked.connect(self.keep)
         back.clicked.connect(self.take_back)
         self.ab = QPushButton("A/B …")
@@ -67,6 +68,11 @@ class TrialBar(QFrame):
         everything.addLayout(row)
         self.hide()
 
+    @property
+    def can_be_decided(self) -> bool:
+        """Whether its buttons are whole in sight."""
+        return is_all_seen(self._keep) and is_all_seen(self._back)
+
     def refresh(self, *, shown: bool = True) -> None:
         """Count down; `shown`: that of the robot that is looked at is to be seen here."""
         station = self.station = self._whose(shown=shown)
@@ -83,9 +89,10 @@ class TrialBar(QFrame):
             self._bar.setRange(0, max(1, round(left_s * 10)))
         self._bar.setValue(round(left_s * 10))
         set_primary(self._keep, is_judged(station))
+        set_tone(self.words, "bad" if station.writing.failed_ask else "")
         whose = "" if station is self._desk.selected else f"{station.title}: "
         self._wordings = self._said(station, trial, whose)
-        self._briefest = whose, ends(trial)
+        self._briefest = whose, ends(station, trial)
         set_tip(self.words, self._wordings[0])
         self._fit()
 
@@ -95,7 +102,7 @@ class TrialBar(QFrame):
 
     def _said(self, station: Station, trial: Trial, whose: str) -> tuple[str, ...]:
         """Return its wordings, the fullest first: each has the time that is left."""
-        units, end = self._desk.shown.units, ends(trial)
+        units, end = self._desk.shown.units, ends(station, trial)
         full = f"{whose}on trial: {', '.join(changes(station, trial, units))}; {end}"
         judged = [f"{full}; {seen}" for seen in so_far(station)]
         brief = [f"{whose}{said}; {end}" for said in wordings(station, trial, units)[1:]]

@@ -30,11 +30,9 @@ def readings(
     at_s: Sequence[float],
     window: tuple[float, float],
     seconds: float,
-) -> Readings | None:
-    """Return what every curve is at the cursors, and over the window in sight; None without any row."""
+) -> Readings:
+    """Return what every curve is at the cursors, and over the window in sight; None where it has no row."""
     times, (left, right) = seconds_ago(scene, seconds), window
-    if not len(times):
-        return None
     a, b = (row_at(times, cursor) for cursor in at_s)
     first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
 

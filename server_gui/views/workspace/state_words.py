@@ -18,12 +18,14 @@ def state_words(
     """Return them; `is_gone`: the instant that was asked for last is."""
     more = len([name for name in chosen if name not in scene.workspace.curves])
     many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
-    if jump is not None and jump.comes:
-        return f"Paused, up to {jump.around_s:.0f} s more come{many}"
-    if scene.frozen is not None:
-        goes_on = "" if station.robot.is_recording else ", data continue"
-        return f"{'Kept by the trigger' if scene.is_kept else 'Paused'}{goes_on}{many}"
-    if is_gone:
+    comes = station.is_live or station.robot.is_recording
+    if scene.frozen is None and is_gone:
         return GONE
-    live = f"{station.robot.rate_hz():.0f} rows/s"
-    return f"{old_text(station)[0] if station.robot.is_stale() else live}{many}"
+    if scene.frozen is None:
+        return f"{f'{station.robot.rate_hz():.0f} rows/s' if comes else old_text(station)[0]}{many}"
+    stands = "Kept by the trigger" if scene.is_kept else "Paused"
+    if not comes:
+        return f"{stands} · {old_text(station)[0]}{many}"
+    if jump is not None and jump.comes:
+        return f"{stands}, up to {jump.around_s:.0f} s more come{many}"
+    return f"{stands}{'' if station.robot.is_recording else ', data continue'}{many}"

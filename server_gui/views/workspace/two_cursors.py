@@ -66,10 +66,9 @@ class TwoCursors:
 
     def read(self) -> None:
         """Read every curve at the cursors, where there are samples, and over what is in sight."""
-        seconds = self._seconds()
-        window = self._area.in_sight(seconds)
-        found = readings(self._scene, self._area.plots, self.at, window, seconds) if self.are_shown else None
-        if found is not None:
+        if self.are_shown:
+            seconds = self._seconds()
+            found = readings(self._scene, self._area.plots, self.at, self._area.in_sight(seconds), seconds)
             self.measuring.show_readings(found.a_s, found.b_s, self.active, found.rows)
 
     def _step(self, samples: int) -> None:
