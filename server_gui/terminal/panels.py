@@ -20,7 +20,7 @@ from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import ENABLED, GLYPHS
 from server_gui.core.alarms.texts import RESET_BUTTON
 from server_gui.core.alarms.unconfirmed import enabled_mark, unstopped
-from server_gui.core.alarms.undriven import undriven
+from server_gui.core.alarms.undriven import is_driven
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -107,7 +107,7 @@ def _danger(station: Station) -> Text:
     Nothing where nobody foresees it, or it is no sign.
     """
     shown = station.predictions.danger
-    if not station.predictions.foresees or undriven(station.robot, station.stopping):
+    if not station.predictions.foresees or not is_driven(station.robot, station.stopping):
         return words("")
     if shown is None or not shown.is_known:
         return words("  danger: not known", style=OLD)

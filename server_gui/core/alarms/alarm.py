@@ -37,6 +37,7 @@ class Alarm:
     node: str = ""  # the bus of what is a node
     under: "tuple[Alarm, ...]" = ()  # what it explains
     aside: str = ""  # said only where there is room for all
+    grade: int = 0  # its code, or how bad it is: where that is another, or worse, it is to be read again
     why: str = ""  # more of the cause, below the line: what is to be done stands in it
 
     @property
@@ -154,6 +155,11 @@ class Alarms:
         self._active = {alarm.key: _kept(before.get(alarm.key), alarm, now_s, newest_ns) for alarm in found}
         self._show(gather(self._active.values()))
 
+    def forget_places(self) -> None:
+        """Forget where they began on the axis of the signals, which begins anew."""
+        self._active = {key: dataclasses.replace(one, at_ns=None) for key, one in self._active.items()}
+        self._show(dataclasses.replace(one, at_ns=None) for one in self._shown)
+
     def acknowledge(self, key: tuple[Kind, str]) -> None:
         """Note that somebody has read it, and what it explains; it is shown smaller until it is over."""
         read = {key} | {under.key for one in self._shown if one.alarm.key == key for under in one.alarm.under}
@@ -181,7 +187,11 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, is_acknowledged=is_read)
     if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
-    return dataclasses.replace(before, alarm=alarm)
+    was = before.alarm.grade
+    if alarm.kind is Kind.HOT:
+        alarm = dataclasses.replace(alarm, grade=max(alarm.grade, was))
+    is_read = before.is_acknowledged and alarm.grade == was
+    return dataclasses.replace(before, alarm=alarm, is_acknowledged=is_read)
 
 
 def _order(one: Active) -> tuple[bool, int, float]:

@@ -7,10 +7,13 @@ A trunk that leans as nobody does who walks, sits or stands up; a joint beyond t
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Final
 
 from gateway.units import with_minus
+from gateway.wire.robot import GuardRuleInfo
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.position_ends import position_ends
 from server_gui.core.follow.robot import Robot
 
@@ -19,6 +22,9 @@ LEANING: Final = {"tilt_forward": ("forward", "backward"), "tilt_side": ("to a s
 TRUNK: Final = "trunk"
 HOT: Final = 85.0  # °C: few drives are rated for more, and their electronics age fast
 SLACK: Final = math.radians(2.0)  # by which a joint may overshoot an end
+HOTTER: Final = 10.0  # °C: so much more is news
+SEES: Final = ("watching", "cleared")  # states of a rule that can trip
+LEFT_S: Final = 10.0  # that a value beyond its limit is left to a rule that does not trip
 HELD_S: Final = 5.0  # what swings about its limit is one alarm, not one a stride
 
 
@@ -31,9 +37,11 @@ class FoundBeyond:
     quantity: str
     what: str
     is_now: bool = True
+    grade: int = 0  # how bad it is
+    is_watched: bool = False  # by a rule of the guard, which has not tripped
 
 
-Key = tuple[Kind, str]
+Key = tuple[Kind, str, str]
 Seen = tuple[FoundBeyond, float | None]  # and since when (s) its value is within again
 
 
@@ -42,6 +50,7 @@ class Beyond:
 
     def __init__(self) -> None:
         self._seen: dict[Key, Seen] = {}
+        self._left_s: dict[Key, float] = {}  # to the guard, since when
 
     def look(self, robot: Robot, *, is_off: bool = False) -> tuple[FoundBeyond, ...]:
         """Return what is beyond its limit now; what was last known so stays while nothing is known.
@@ -50,20 +59,32 @@ class Beyond:
         """
         if robot.is_stale():
             return () if robot.is_recording else self._of(robot)
+        now_s = now_ns() / 1e9
+        beyond = {(one.kind, one.component, one.quantity): one for one in _found(robot)}
         found: dict[Key, Seen] = {
             key: (one, None)
-            for one in _found(robot)
-            if (key := (one.kind, one.component)) in self._seen or not (is_off and one.kind is Kind.FALLEN)
+            for key, one in beyond.items()
+            if key in self._seen
+            or not ((is_off and one.kind is Kind.FALLEN) or self._is_left(robot, key, one, now_s))
         }
+        self._left_s = {key: since_s for key, since_s in self._left_s.items() if key in beyond}
         if not robot.is_recording:  # whose instant goes to and fro
-            now_s = robot.now_s()
             kept = {key: _fading(robot, now_s, *seen) for key, seen in self._seen.items()}
             found = {key: seen for key, seen in kept.items() if seen is not None} | found
         self._seen = found
         return self._of(robot)
 
+    def _is_left(self, robot: Robot, key: Key, one: FoundBeyond, now_s: float) -> bool:
+        """Return whether its rule is to say so, and still may: some wait for long, or for ever."""
+        if not one.is_watched:
+            return False
+        return robot.is_recording or now_s - self._left_s.setdefault(key, now_s) < LEFT_S
+
     def _of(self, robot: Robot) -> tuple[FoundBeyond, ...]:
-        return tuple(one for one, _ in self._seen.values() if one.component in robot.parts)
+        """Return one of each kind and component: what is known to be so goes before."""
+        seen = sorted((one for one, _ in self._seen.values()), key=lambda one: one.is_now)
+        one_each = {(one.kind, one.component): one for one in seen if one.component in robot.parts}
+        return tuple(one_each.values())
 
 
 def _fading(robot: Robot, now_s: float, one: FoundBeyond, within_s: float | None) -> Seen | None:
@@ -96,11 +117,11 @@ def _found(robot: Robot) -> Iterator[FoundBeyond]:
 def _leaning(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     for quantity, (forward, backward) in LEANING.items():
         tilt = _value(robot, name, quantity)
-        if tilt is not None and abs(tilt) > LEANS and not _is_watched(robot, name, quantity, tilt, LEANS):
+        watch = None if tilt is None else _watch(robot, name, quantity, tilt, LEANS)
+        if tilt is not None and abs(tilt) > LEANS and watch is not Watch.TRIPPED:
             way = forward if tilt > 0 else backward
             what = f"leans {abs(math.degrees(tilt)):.0f}° {way}, further than who walks or stands up"
-            yield FoundBeyond(Kind.FALLEN, name, quantity, what)
-            return
+            yield FoundBeyond(Kind.FALLEN, name, quantity, what, is_watched=watch is Watch.WATCHES)
 
 
 def _beyond_an_end(robot: Robot, name: str) -> Iterator[FoundBeyond]:
@@ -108,19 +129,21 @@ def _beyond_an_end(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     if position is None or ends is None or ends[0] - SLACK <= position <= ends[1] + SLACK:
         return
     way = position - sum(ends) / 2
-    if _is_watched(robot, name, "position", way, (ends[1] if way > 0 else -ends[0]) + SLACK):
+    watch = _watch(robot, name, "position", way, (ends[1] if way > 0 else -ends[0]) + SLACK)
+    if watch is Watch.TRIPPED:
         return
     at, low, high = (with_minus(f"{math.degrees(angle):.0f}") for angle in (position, *ends))
     what = f"it is at {at}°, its drive's range is {low}° to {high}°"
-    yield FoundBeyond(Kind.BEYOND, name, "position", what)
+    yield FoundBeyond(Kind.BEYOND, name, "position", what, is_watched=watch is Watch.WATCHES)
 
 
 def _hot(robot: Robot, name: str) -> Iterator[FoundBeyond]:
     temperature = _value(robot, name, "temperature")
     if temperature is not None and is_hot(temperature):
-        if _is_watched(robot, name, "temperature", temperature, math.inf):  # who wrote it knows the drive
-            return
-        yield FoundBeyond(Kind.HOT, name, "temperature", f"{temperature:.1f} °C, hot from {HOT:.0f} °C on")
+        if _watch(robot, name, "temperature", temperature, math.inf) is not Watch.NONE:
+            return  # who wrote it knows the drive
+        what = f"{temperature:.1f} °C, hot from {HOT:.0f} °C on"
+        yield FoundBeyond(Kind.HOT, name, "temperature", what, grade=int(temperature // HOTTER))
 
 
 def _value(robot: Robot, name: str, quantity: str) -> float | None:
@@ -129,18 +152,36 @@ def _value(robot: Robot, name: str, quantity: str) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _is_watched(robot: Robot, name: str, quantity: str, way: float, within: float) -> bool:
-    """Return whether a guard has a limit on this side (up: `way` above 0), no further out than `within`.
+class Watch(Enum):
+    """What the guard does about a value."""
 
-    One that does not run, or a rule that is blind, watches nothing.
+    NONE = "nothing, as far as is known"
+    WATCHES = "a rule of it has a limit there"
+    TRIPPED = "that rule has said so"
+
+
+def _watch(robot: Robot, name: str, quantity: str, way: float, within: float) -> Watch:
+    """Return it for a limit on this side (up: `way` above 0), no further out than `within`.
+
+    One that does not run, or a rule that is blind or whose state nobody knows, watches nothing.
     """
     guard = None if robot.description is None else robot.description.guard
     if guard is None or not guard.configured or guard.problem is not None:
-        return False
+        return Watch.NONE
+    found = Watch.NONE
     for rule in guard.rules:
         limit = rule.high if way > 0 else None if rule.low is None else -rule.low
-        is_of_it = name in rule.on and quantity in rule.quantities
-        sees = (robot.word(f"guard.{rule.name}") or rule.state) != "blind"
-        if is_of_it and sees and limit is not None and limit <= within:
-            return True
-    return False
+        if name not in rule.on or quantity not in rule.quantities or limit is None or limit > within:
+            continue
+        state = _state(robot, rule)
+        if state == "tripped":
+            return Watch.TRIPPED
+        found = Watch.WATCHES if state in SEES else found
+    return found
+
+
+def _state(robot: Robot, rule: GuardRuleInfo) -> str | None:
+    """Return how a rule is now; of a guard without channels, how it was as the link came."""
+    channel = f"guard.{rule.name}"
+    known = () if robot.description is None else robot.description.channels
+    return robot.word(channel) if any(one.name == channel for one in known) else rule.state

@@ -23,12 +23,14 @@ from server_gui.core.alarms.silent_nodes import MISSED_CODES, NO_VALUES, said_of
 from server_gui.core.alarms.simulated import without_wires
 from server_gui.core.alarms.stop_alarms import stop_alarms
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.alarms.undriven import undriven
+from server_gui.core.alarms.undriven import is_driven
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress
 
+UNLOOKED_S: Final = 8.0  # without a word of how devices are: several looks have failed
+NOT_LOOKED: Final = "how its devices are has not come for some seconds: ok is what they were"
 NO_CODE_YET: Final = "its code has not come yet"
 NO_CODE_THEN: Final = "its code is not known at this instant"
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
@@ -91,6 +93,7 @@ def _found(facts: Facts) -> Iterator[Alarm]:
             yield from _of_part(robot, part, facts.stopping)
     yield from _of_silent(robot)
     yield from _of_those_that_come_up(robot)
+    yield from _of_looks(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
     yield from _of_beyond(facts)
@@ -147,6 +150,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
         did=_did(robot, stopping),
         check="; ".join(filter(None, (check, more))),
         channel=_channel(robot, name, code),
+        grade=code or 0,
         clears=not robot.is_recording,
         is_now=not robot.is_stale(),
     )
@@ -183,7 +187,15 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
             check = error_check(int(found[1], 16))
             what = said_of_missed(int(found[1], 16), _PREFIX.sub("", problem))
             yield Alarm(
-                Kind.REPORTS, part.name, what, where, check=check, channel=channel, clears=True, is_now=is_now
+                Kind.REPORTS,
+                part.name,
+                what,
+                where,
+                check=check,
+                channel=channel,
+                grade=int(found[1], 16),
+                clears=True,
+                is_now=is_now,
             )
         return
     if part.kind == "joint" and (robot.word(f"{part.name}.state") in FAULTY or "in fault" in problem):
@@ -239,6 +251,20 @@ def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
             check=check_of(Kind.NO_DATA),
             is_now=not robot.is_stale(),
         )
+
+
+def _of_looks(robot: Robot) -> Iterator[Alarm]:
+    """Yield that nobody tells how its devices are, though rows come: "ok" is what they were."""
+    if robot.is_recording or not robot.is_linked or not robot.parts or robot.unlooked_s < UNLOOKED_S:
+        return
+    yield Alarm(
+        Kind.UNKNOWN,
+        "devices",
+        NOT_LOOKED,
+        check=check_of(Kind.STALE),
+        since_s=time.time() - robot.unlooked_s,
+        is_now=not robot.is_stale(),
+    )
 
 
 # --- guard and buses
@@ -307,6 +333,7 @@ def _of_beyond(facts: Facts) -> Iterator[Alarm]:
             _did(robot, facts.stopping),
             check_of(one.kind),
             channel=_channel(robot, one.component, None, (one.quantity,)),
+            grade=one.grade,
             is_now=one.is_now and not robot.is_stale(),
         )
 
@@ -320,7 +347,7 @@ def _of_danger(facts: Facts) -> Iterator[Alarm]:
     known = None if shown is None else shown.known
     if shown is None or known is None or known.level < Level.ADVICE:
         return
-    if undriven(facts.robot, facts.stopping):
+    if not is_driven(facts.robot, facts.stopping):
         return
     kind = Kind.DANGER if known.level >= Level.ALARM else Kind.DANGER_ADVICE
     did = "" if shown.is_known else "whether it is so still is not known"

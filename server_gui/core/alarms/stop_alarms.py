@@ -33,6 +33,7 @@ def stop_alarms(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             check=go_on(Kind.STOPPED, robot),
             since_s=stopping.since_s,
             aside=by,
+            why=stopping.problem,
         )
     elif stopping.was_ended and not any_enabled(robot):
         words = set(state_words(robot).values())

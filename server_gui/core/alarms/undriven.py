@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from server_gui.core.alarms.drive_states import FAULTY, state_words
+from server_gui.core.alarms.drive_states import FAULTY, any_enabled, state_words
 from server_gui.core.alarms.unconfirmed import enabled_again
 from server_gui.core.follow.robot import Robot
-from server_gui.core.tuning.stop import StopProgress, is_off
+from server_gui.core.tuning.stop import StopProgress, StopState, is_off
 
 HELD: Final = "a stop is held"
 STOPPING: Final = "drives stop"
@@ -17,13 +17,20 @@ _QUICK_STOP: Final = "quick stop active"
 def undriven(robot: Robot, stopping: StopProgress) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
     words = [None if word is None else word.lower() for word in state_words(robot).values()]
-    if stopping.held and not enabled_again(robot, stopping):
+    is_open = stopping.is_unproven or stopping.state is StopState.SENT
+    if stopping.held and not is_open and not enabled_again(robot, stopping):
         return HELD
     if _QUICK_STOP in words:
         return STOPPING
     if any(word in FAULTY for word in words):
         return IN_FAULT
     return NONE_ENABLED if words and all(map(is_off, words)) else ""
+
+
+def is_driven(robot: Robot, stopping: StopProgress) -> bool:
+    """Return whether it may drive its wearer: also where some drives are in fault or stop, not all."""
+    why = undriven(robot, stopping)
+    return not why or (why in (STOPPING, IN_FAULT) and any_enabled(robot))
 
 
 def is_idle(robot: Robot, stopping: StopProgress) -> bool:

@@ -14,7 +14,7 @@ def unstopped(commissioning: Commissioning) -> list[Alarm]:
     check = check_of(Kind.NOT_STOPPED)
     return [
         Alarm(
-            Kind.NOT_STOPPED, f"commissioned {file}", one.why or NOT_EVERY, one.name, "", check, one.since_s
+            Kind.NOT_STOPPED, f"commissioned {place}", one.why or NOT_EVERY, one.name, "", check, one.since_s
         )
-        for file, one in commissioning.unconfirmed.items()
+        for place, one in commissioning.unconfirmed.items()
     ]

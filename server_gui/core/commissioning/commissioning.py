@@ -105,7 +105,7 @@ class Commissioning:
         self.wish: CommissioningRequest | None = None
         self._stage = Stage.NOT_STARTED
         self.since_s = time.time()  # UTC: of the stage
-        self.unconfirmed: dict[str, Unconfirmed] = {}  # by file, whatever is commissioned after it
+        self.unconfirmed: dict[str, Unconfirmed] = {}  # by place, whatever is commissioned after it
         self.question: Message | None = None
         self.steps: tuple[StepMessage, ...] = ()
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
@@ -143,9 +143,9 @@ class Commissioning:
         if stage is not self._stage:
             self._stage, self.since_s = stage, time.time()
         if self.wish is not None and stage is Stage.NOT_CONFIRMED:
-            self.unconfirmed[self.wish.file] = Unconfirmed(self.name, self.problem, self.since_s)
+            self.unconfirmed[self.wish.place] = Unconfirmed(self.name, self.problem, self.since_s)
         elif self.wish is not None and stage is Stage.STOPPED:
-            self.unconfirmed.pop(self.wish.file, None)
+            self.unconfirmed.pop(self.wish.place, None)
 
     @property
     def look_of(self) -> StageView:

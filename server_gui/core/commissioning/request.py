@@ -37,6 +37,11 @@ class CommissioningRequest:
         return ""
 
     @property
+    def place(self) -> str:
+        """The robot's file and computer, which tell it from every other: `user@exo-01:exo-01.toml`."""
+        return f"{self.computer}:{self.file}" if self.computer else self.file
+
+    @property
     def left(self) -> Path | None:
         """The draft of an earlier dialogue, on this computer."""
         kept = Path(self.file + SUFFIX)

@@ -263,9 +263,12 @@ class Station:
         if is_another:
             self.rings.clear()
             self.flags.clear()
+            self.predictions.forget_danger()
+            self._alarms.found.forget_places()
             self._happened, self.flash.clock = FlagWatch(), None
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
-        self.stopping.described(description.stop.held, description.stop.reason, is_anew=is_another)
+        stop = description.stop
+        self.stopping.described(stop.held, stop.reason, stop.problem)
         if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):
             self.tell(
                 NewsKind.WARNING, "another robot is called so too: give one another [robot] name in its file"

@@ -80,6 +80,7 @@ class Robot:
     parts: dict[str, FollowedComponent] = field(default_factory=dict)
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
     parameters_at_ns: int | None = None
+    looked_at_ns: int | None = None  # when the states of its components came last
     resources: ResourceSnapshot | None = None
     resources_at_ns: int | None = None
     buses: tuple[BusInfo, ...] | None = None  # None: not known
@@ -150,6 +151,12 @@ class Robot:
         """Return whether the values are too old to be called live."""
         age_s = self.age_s(now_ns)
         return age_s is None or age_s * 1e9 > STALE_NS
+
+    @property
+    def unlooked_s(self) -> float:
+        """Seconds since its components' states came, or since there is a link without any."""
+        since_ns = max(self.looked_at_ns or 0, self.link.since_ns)
+        return (frame_time.now_ns() - since_ns) / 1e9
 
     def is_newer_than(self, at_ns: int) -> bool:
         """Return whether the newest row was taken after this instant, of our clock."""
@@ -254,6 +261,7 @@ class Robot:
         self._dropped_seen = batch.dropped
 
     def _looked(self, event: Looked) -> None:
+        self.looked_at_ns = event.at_ns
         for name, found in event.quality.quality.items():
             if name in self.parts:
                 self.parts[name] = _part(self.parts[name], found)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ml.danger.levels import Level
@@ -147,8 +147,18 @@ class StationPredictions:
         return None if self.danger is None else self.danger.known
 
     def clear(self) -> None:
-        """Forget everything: the link has dropped, or the robot has booted."""
+        """Forget everything but danger that was known last: the link has dropped, which ends none."""
         self.revision += 1
         self.by_task.clear()
-        self.danger = self.adapting = None
+        self.adapting = None
         self._rules.clear()
+        known = None if self.danger is None else self.danger.known
+        if self.danger is None or known is None or known.level < Level.ADVICE:
+            self.danger = None
+        else:
+            self.danger = replace(self.danger, came_ns=0)  # so long ago that it is not known to be so still
+
+    def forget_danger(self) -> None:
+        """Forget that, too: the robot's computer has started anew."""
+        self.revision += 1
+        self.danger = None

@@ -15,6 +15,7 @@ ENABLED = "operation enabled"
 HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
 AGAIN = "stopped again"  # while one is held: by somebody, or a drive by the gateway
 CLOCKS_NS = 50_000_000  # that ours and a robot's are compared to
+CALENDAR_S = 1.0  # by which calendars that were compared over a link may differ
 
 
 LEAST_MS = 1.0  # nothing is said to have stopped in 0 ms
@@ -91,6 +92,7 @@ class StopProgress:
     held: bool = False
     is_outdated: bool = False  # the robot's file cannot be used: it can confirm none
     reason: str = ""  # of the one that is held
+    problem: str = ""  # why that will not outlive the robot's gateway
     was_ended: bool = False  # by a reset, since when nothing was enabled
     at_ns: int | None = None
     since_s: float | None = None  # UTC: of this state, as far as is known
@@ -109,6 +111,7 @@ class StopProgress:
     _clock: ClockOffset | None = None  # of the robot when it was sent
     _boot_id: str | None = None  # likewise
     _reads: int = 0  # of the journal, since it was sent
+    _told_s: float | None = None  # UTC: when the robot said itself that one of others is held
     _entry: int = 0  # of the journal: the newest that was read
     _is_written: bool = True  # whether the latest STOP was read in the journal: resets before are older
 
@@ -152,14 +155,14 @@ class StopProgress:
             self.proofs, self._off, self._clock, self._boot_id, self._reads = {}, set(off), clock, boot_id, 0
         self.state, self.text, self.why, self.answered_ms = StopState.SENT, "STOP sent …", "", None
         self.silent, self._confirmed, self.was_ended, self._is_written = (), frozenset(), False, False
-        self.is_outdated = False
+        self.is_outdated, self.problem = False, ""
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
         """Take the drives' answers, and their local time (default: now)."""
         if number != self.number:
             return
-        self.held = stopped.held
+        self.held, self.problem = stopped.held, stopped.problem or ""
         if self.at_ns is not None:
             after_ns = (time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns
             self.answered_ms = max(LEAST_MS, after_ns / 1e6)
@@ -196,7 +199,7 @@ class StopProgress:
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
             self.silent, self._confirmed = (), frozenset()  # they say nothing of the next one
-            self.is_outdated = False
+            self.is_outdated, self.problem = False, ""
             self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
             self._stood_s = None
 
@@ -207,10 +210,11 @@ class StopProgress:
 
     # --- what the robot shows meanwhile
 
-    def described(self, held: bool, reason: str | None, *, is_anew: bool = False) -> None:
+    def described(self, held: bool, reason: str | None, problem: str | None = None) -> None:
         """Take the robot's description on every new link: a stop may have ended while there was none.
 
-        `is_anew`: its computer has started again since.
+        One that was confirmed here, and that nobody has reset by the robot's journal, is not ended: the robot
+        holds it no more, and it may have lost it with its gateway or its computer.
         """
         self._hears(held)
         self._stood_s = self._stood_s if held else None
@@ -218,8 +222,8 @@ class StopProgress:
             self.proofs, self.was_ended = {}, False
             self.since_s = None  # the journal, or our own STOP, tells since when
         self.held, self.reason = held, (reason or "") if held else ""
-        if not held and self.state is StopState.CONFIRMED and (self._is_written or is_anew):
-            self.was_reset(held=False)
+        self.problem = problem or "" if held else self.problem
+        self._told_s = time.time() if held and self.state is StopState.IDLE else None
 
     def read(self, entries: Iterable[Mapping[str, Any]], boot_id: str | None = None) -> None:
         """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
@@ -236,6 +240,8 @@ class StopProgress:
             if number <= self._entry:
                 continue
             self._entry = number
+            if is_history and self._is_before_its_word(entry):
+                continue
             if self._is_after(entry, boot_id):
                 self._read(entry, is_open=is_open)
             elif entry.get("what") in HELD_BY and not self.held:  # held still, as far as is read
@@ -246,6 +252,12 @@ class StopProgress:
         self._reads += 1
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since
+
+    def _is_before_its_word(self, entry: Mapping[str, Any]) -> bool:
+        """Return whether a reset is older than the robot's own word: a stop since may be in no journal."""
+        if self._told_s is None or not _is_reset(entry):
+            return False
+        return "utc_ns" not in entry or self._utc_s(entry) < self._told_s - CALENDAR_S
 
     def _is_after(self, entry: Mapping[str, Any], boot_id: str | None) -> bool:
         """Return whether an entry is no older than our STOP, whose own was not read yet.
@@ -380,7 +392,8 @@ class StopProgress:
     @property
     def news(self) -> str:
         """What became of it, without a time: rows that come later may show a shorter one."""
-        return f"STOP confirmed by {self.every_drive}" if self.state is StopState.CONFIRMED else self.text
+        said = f"STOP confirmed by {self.every_drive}" if self.state is StopState.CONFIRMED else self.text
+        return "; ".join(filter(None, (said, self.problem)))
 
     @property
     def proof(self) -> str:

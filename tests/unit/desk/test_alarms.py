@@ -310,7 +310,14 @@ def test_what_the_drive_and_the_robot_say_of_one_fault_is_said_once_each_time_it
         return len([text for text in told if code in text])
 
     in_fault = "the drive is in fault: 0x2310 continuous overcurrent at the output (register: current)"
-    both = [lambda: row(7.0, float(0x2310)), lambda: word("fault", in_fault)]
+
+    def by_the_drive() -> None:
+        row(7.0, float(0x2310))
+
+    def by_the_robot() -> None:
+        word("fault", in_fault)
+
+    both = [by_the_drive, by_the_robot]
     row(4.0, 0.0)
     for count in (1, 2):
         for one in both if first == "the drive" else reversed(both):

@@ -8,7 +8,7 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.wire.component import AngleInfo, QualityInfo, Snapshot
+from gateway.wire.component import AngleInfo, ChannelInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.alarms import beyond
@@ -35,6 +35,11 @@ def now(bench: Bench, **values: float | None) -> None:
     now_ns = time.monotonic_ns()
     columns = {name.replace("__", "."): [value] for name, value in values.items()}
     bench.look_again([telemetry([now_ns], columns, now_ns)])
+
+
+def _later(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    at_ns = time.monotonic_ns() + round(seconds * 1e9)
+    monkeypatch.setattr(beyond, "now_ns", lambda: at_ns)
 
 
 def told(station: Station, kind: Kind) -> Alarm | None:
@@ -130,8 +135,7 @@ def test_a_hot_drive_is_told_and_is_over_some_seconds_after_it_has_cooled(
     assert told(bench.station, Kind.HOT) is not None
     now(bench, left_knee__temperature=84.9)
     assert told(bench.station, Kind.HOT) is not None
-    later = time.time() + beyond.HELD_S
-    monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _: later)
+    _later(monkeypatch, beyond.HELD_S)
     now(bench, left_knee__temperature=84.9)
     assert told(bench.station, Kind.HOT) is None
 
@@ -140,9 +144,9 @@ def test_what_was_last_known_does_not_end_by_being_unknown(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now(bench, trunk__tilt_side=1.4)
-    robot, later = bench.station.robot, time.time() + 60.0
+    robot = bench.station.robot
     monkeypatch.setattr(robot.__class__, "is_stale", lambda *_: True)
-    monkeypatch.setattr(robot.__class__, "now_s", lambda _: later)
+    _later(monkeypatch, 60.0)
     bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
     alarm = told(bench.station, Kind.FALLEN)
     assert alarm is not None
@@ -218,15 +222,13 @@ def test_a_fall_does_not_end_because_its_sensor_is_lost(
 ) -> None:
     now(bench, trunk__tilt_forward=1.5)
     for later_s in (1.0, 2.0 * beyond.HELD_S, 5.0 * beyond.HELD_S):
-        at_s = time.time() + later_s
-        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        _later(monkeypatch, later_s)
         now(bench, trunk__tilt_forward=None, left_knee__position=0.1)
         alarm = told(bench.station, Kind.FALLEN)
         assert alarm is not None
         assert not alarm.is_now
     for later_s in (26.0, 26.0 + beyond.HELD_S):
-        at_s = time.time() + later_s
-        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        _later(monkeypatch, later_s)
         now(bench, trunk__tilt_forward=0.1)
     assert told(bench.station, Kind.FALLEN) is None
 
@@ -241,7 +243,8 @@ def test_a_value_whose_channel_is_gone_is_no_alarm_for_good(bench: Bench) -> Non
 
 
 @pytest.mark.parametrize(
-    ("state", "high", "is_told"), [("watching", 1.0, False), ("watching", 1.5, True), ("blind", 1.0, True)]
+    ("state", "high", "is_told"),
+    [("watching", 1.0, False), ("watching", 1.5, True), ("blind", 1.0, True), ("odd", 1.0, True)],
 )
 def test_a_guard_tells_a_fall_only_where_it_sees_and_trips_no_later(
     bench: Bench, state: str, high: float, is_told: bool
@@ -254,6 +257,102 @@ def test_a_guard_tells_a_fall_only_where_it_sees_and_trips_no_later(
     bench.station.take([Described(replace(description, guard=GuardInfo(configured=True, rules=[rule])))])
     now(bench, trunk__tilt_forward=math.radians(80.0))
     assert (told(bench.station, Kind.FALLEN) is not None) is is_told
+
+
+def guarded(bench: Bench, state: str, *, with_channel: bool = False) -> None:
+    """A rule of the trunk's tilt, in this state as the link came."""
+    rule = GuardRuleInfo(
+        "lean", "tilt", "above", ["trunk"], ["alarm"], "alarm", state, 0, None, 0, [],
+        quantities=["tilt_forward", "tilt_side"], low=-1.0, high=1.0,
+    )  # fmt: skip
+    description = described().description
+    words = {"0": "watching", "1": "cleared", "2": "blind", "3": "tripped"}
+    channel = ChannelInfo("guard.lean", "", "guard", "lean", enum=words)
+    channels = [*description.channels, *([channel] if with_channel else [])]
+    guard = GuardInfo(configured=True, rules=[rule])
+    bench.station.take([Described(replace(description, guard=guard, channels=channels))])
+
+
+def test_a_fall_is_left_to_a_rule_no_longer_than_for_some_seconds(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rule may wait for a minute, or never trip."""
+    guarded(bench, "watching")
+    now(bench, trunk__tilt_forward=1.5)
+    assert told(bench.station, Kind.FALLEN) is None
+    _later(monkeypatch, beyond.LEFT_S - 1.0)
+    now(bench, trunk__tilt_forward=0.1)
+    now(bench, trunk__tilt_forward=1.5)
+    _later(monkeypatch, beyond.LEFT_S + 1.0)
+    now(bench, trunk__tilt_forward=1.5)
+    assert told(bench.station, Kind.FALLEN) is None, "it is another fall"
+    _later(monkeypatch, 2.0 * beyond.LEFT_S)
+    now(bench, trunk__tilt_forward=1.5)
+    assert told(bench.station, Kind.FALLEN) is not None
+
+
+@pytest.mark.parametrize(
+    ("value", "is_told"), [(0.0, False), (3.0, False), (2.0, True), (None, True), (7.0, True)]
+)
+def test_a_rule_of_which_nobody_knows_whether_it_sees_hides_no_fall(
+    bench: Bench, value: float | None, is_told: bool
+) -> None:
+    guarded(bench, "watching", with_channel=True)
+    now(bench, trunk__tilt_forward=1.5, guard__lean=value)
+    assert (told(bench.station, Kind.FALLEN) is not None) is is_told
+
+
+def test_a_tilt_to_the_side_that_is_over_ends_no_other_that_is_not_known(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now(bench, trunk__tilt_forward=1.5, trunk__tilt_side=0.0)
+    now(bench, trunk__tilt_forward=None, trunk__tilt_side=1.2)
+    now(bench, trunk__tilt_forward=None, trunk__tilt_side=0.0)
+    _later(monkeypatch, 2.0 * beyond.HELD_S)
+    now(bench, trunk__tilt_forward=None, trunk__tilt_side=0.0)
+    alarm = told(bench.station, Kind.FALLEN)
+    assert alarm is not None
+    assert not alarm.is_now
+
+
+def test_a_calendar_that_jumps_ends_no_heat(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    now(bench, left_knee__temperature=95.0)
+    now(bench, left_knee__temperature=80.0)
+    later_s = time.time() + 1000.0
+    monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _: later_s)
+    now(bench, left_knee__temperature=80.0)
+    assert told(bench.station, Kind.HOT) is not None
+
+
+def test_what_is_much_hotter_than_what_was_read_is_to_be_read_again(bench: Bench) -> None:
+    now(bench, left_knee__temperature=86.0)
+    alarm = told(bench.station, Kind.HOT)
+    assert alarm is not None
+    bench.station.acknowledge(alarm)
+    for temperature, is_read in ((88.0, True), (86.0, True), (97.0, False)):
+        now(bench, left_knee__temperature=temperature)
+        (one,) = [one for one in bench.station.alarms.active if one.alarm.kind is Kind.HOT]
+        assert one.is_acknowledged is is_read
+    bench.station.acknowledge(one.alarm)
+    for temperature in (86.0, 97.0):  # it has been as hot, and somebody has read it
+        now(bench, left_knee__temperature=temperature)
+        (one,) = [one for one in bench.station.alarms.active if one.alarm.kind is Kind.HOT]
+        assert one.is_acknowledged
+
+
+def test_a_second_fall_is_an_event_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def falls() -> int:
+        return sum(one.count for one in bench.desk.news.items if "leans" in one.text)
+
+    now(bench, trunk__tilt_forward=1.5)
+    assert falls() == 1
+    now(bench, trunk__tilt_forward=0.0)
+    with monkeypatch.context() as patched:
+        _later(patched, 2.0 * beyond.HELD_S)
+        now(bench, trunk__tilt_forward=0.0)
+    assert told(bench.station, Kind.FALLEN) is None
+    now(bench, trunk__tilt_forward=1.4)
+    assert falls() == 2
 
 
 def test_several_values_that_go_beyond_at_once_are_one_event_as_bad_as_its_alarm(bench: Bench) -> None:
@@ -290,8 +389,7 @@ def test_ends_that_become_unknown_end_no_alarm(bench: Bench, monkeypatch: pytest
     assert told(bench.station, Kind.BEYOND) is not None
     bench.station.robot.parameters.clear()
     for later_s in (1.0, 3.0 * beyond.HELD_S):
-        at_s = time.time() + later_s
-        monkeypatch.setattr(bench.station.robot.__class__, "now_s", lambda _, at_s=at_s: at_s)
+        _later(monkeypatch, later_s)
         now(bench, left_knee__position=2.5)
         alarm = told(bench.station, Kind.BEYOND)
         assert alarm is not None

@@ -5,20 +5,23 @@ from datetime import UTC, datetime
 from typing import Any, Final
 
 import pytest
+from msgspec.structs import replace
 
 from gateway.client import ConnectionState
+from gateway.wire.stop import Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.alarms.undriven import HELD, undriven
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.flags import FlagKind, of_events
 from server_gui.core.desk.station import Station
 from server_gui.core.fleet.live_prediction import RecordedPrediction
-from server_gui.core.follow.events import LinkChanged
+from server_gui.core.follow.events import Described, LinkChanged
 from server_gui.core.prediction.news import turn
 from server_gui.core.prediction.robot_predictor import RobotPredictor
 from server_gui.core.recording.batching import EventKind
 from server_gui.terminal.danger_prediction import DangerPrediction
-from tests.support.desk import Bench, described, looked, walking
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 from tests.support.terminal_robot import a_station, screen
 from tests.unit.prediction.endangered import HOT, endangered
 from tests.unit.prediction.robots import ROBOT
@@ -85,8 +88,45 @@ def test_a_robot_that_is_stopped_or_has_gone_is_not_judged(station: Station) -> 
     station.stopping.described(True, "somebody's")
     assert not told(station)
     station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
-    assert station.predictions.danger is None
+    assert station.predictions.danger is not None
+    assert not station.predictions.danger.is_known
     assert Kind.NO_LINK in {one.alarm.kind for one in station.alarms.active}
+
+
+def test_a_blink_of_the_link_ends_no_danger_and_another_start_does(station: Station) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    for state in (ConnectionState.WAITING, ConnectionState.CONNECTED):
+        station.take([LinkChanged(state, "gone", time.monotonic_ns())])
+    station.take([walking(10)])
+    assert told(station) == [(Kind.DANGER, False)]
+    anew = described()
+    station.take([Described(replace(anew.description, boot_id="another"))])
+    assert not told(station)
+    station.take_prediction(endangered(Level.EARLY))
+    station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    assert station.predictions.danger is None, "it was none to look at"
+
+
+@pytest.mark.parametrize("others", [4.0, 5.0])
+@pytest.mark.parametrize("one", [5.0, 7.0])
+def test_one_drive_that_stops_does_not_end_the_danger_of_those_that_go_on(
+    station: Station, one: float, others: float
+) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    columns: dict[str, list[float | None]] = {f"{joint}.state": [others] for joint in JOINTS}
+    station.take([telemetry([time.monotonic_ns()], {**columns, "left_knee.state": [one]})])
+    assert (Kind.DANGER in {kind for kind, _ in told(station)}) is (others == 4.0)
+
+
+def test_a_stop_that_is_not_confirmed_ends_no_danger_while_drives_are_enabled(station: Station) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    stopping = station.stopping
+    number = stopping.sent()
+    assert undriven(station.robot, stopping) != HELD
+    stopping.answered(number, Stopped(dict.fromkeys(JOINTS, "unconfirmed"), held=True))
+    assert undriven(station.robot, stopping) != HELD
+    assert Kind.DANGER in {kind for kind, _ in told(station)}
+    assert "danger: alarm" in screen(station)
 
 
 def test_it_stands_on_the_axis_of_time_where_it_begins_gets_worse_and_ends(station: Station) -> None:

@@ -4,6 +4,7 @@ import time
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from gateway.client import ClockOffset
 from gateway.wire.stop import Stopped
@@ -26,6 +27,8 @@ def test_a_confirmed_stop_that_was_reset_while_there_was_no_link_is_not_shown_an
     stopping.answered(stopping.sent(), ALL)
     stopping.read([written(5, "stop")])
     stopping.described(held=False, reason=None)
+    assert (stopping.state, stopping.is_let_go) == (StopState.CONFIRMED, True), "who says that it was reset?"
+    stopping.read([RESET])
     assert (stopping.stage, stopping.was_ended) == ((StopState.IDLE, False), True)
     stopping.answered(stopping.sent(), ALL)
     stopping.described(held=False, reason=None)  # it may be older than this stop
@@ -206,11 +209,34 @@ def test_a_stop_that_repeats_one_without_an_answer_is_timed_from_that() -> None:
     assert stopping.text.endswith("in 800 ms"), "not the 4 ms of the second"
 
 
-def test_a_confirmed_stop_ends_where_the_robot_has_started_again_and_holds_none() -> None:
+def test_a_stop_that_a_robot_lost_as_it_started_again_is_not_called_reset() -> None:
+    """Its disk was full: the stop was held, but not beyond its gateway, and whoever enabled it was green."""
+    problem = "this stop is held, but not beyond this gateway: No space left on device"
     stopping = StopProgress()
-    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), ALL)
-    stopping.described(held=False, reason=None, is_anew=True)
-    assert stopping.stage == (StopState.IDLE, False)
+    said = replace(ALL, problem=problem)
+    stopping.answered(stopping.sent(at_ns=SENT_NS, clock=CLOCK, boot_id=BOOT), said)
+    assert stopping.problem == problem
+    stopping.read([at(1, "stop", SENT_NS + 1_000_000)], BOOT)
+    stopping.described(held=False, reason=None)
+    stopping.read([at(1, "stop", SENT_NS + 1_000_000)], "another")
+    assert stopping.is_let_go
+    stopping.was_reset(held=False)
+    assert (stopping.stage, stopping.problem) == ((StopState.IDLE, False), "")
+
+
+@pytest.mark.parametrize(("after_s", "is_held"), [(-60.0, True), (5.0, False)])
+def test_a_reset_before_the_robots_own_word_is_not_of_the_stop_that_it_holds(
+    after_s: float, is_held: bool
+) -> None:
+    """The stop since was in no journal: the disk was full."""
+    stopping = StopProgress()
+    stopping.described(held=True, reason="door", problem="not beyond this gateway")
+    at_ns = round((time.time() + after_s) * 1e9)
+    stopping.read([written(1, "stop", utc_ns=at_ns - 1), written(2, "reset", held=False, utc_ns=at_ns)])
+    assert stopping.held is is_held
+    assert stopping.problem == ("not beyond this gateway" if is_held else "")
+    stopping.read([written(3, "reset", held=False, utc_ns=at_ns)])
+    assert not stopping.held, "this was written since"
 
 
 def test_a_clock_is_believed_no_further_than_it_says() -> None:

@@ -348,3 +348,14 @@ def test_a_stop_that_was_not_confirmed_stays_named_when_another_robot_is_commiss
     again.end(0)
     assert stage(again) is Stage.STOPPED
     assert unstopped(again.model) == []
+
+
+def test_a_stop_of_one_computer_confirms_none_of_another(played: Played) -> None:
+    """Their files have one name: the alarm of the first was gone with the second's STOP."""
+    for computer, confirmed in (("ada@a", False), ("ada@b", True), ("", True)):
+        played.start(CommissioningRequest("exo.toml", "can0", computer=computer))
+        played.hear(asks("Hold it"))
+        played.model.stop()
+        played.hear(stopped(confirmed=confirmed))
+        played.end(1)
+        assert [one.subject for one in unstopped(played.model)] == ["commissioned ada@a:exo.toml"]
