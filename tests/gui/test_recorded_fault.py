@@ -17,7 +17,7 @@ from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
 from server_gui.views.recordings.timeline import clock_text, day_text
 from server_gui.views.widgets.cursors import FIRST, FLAGS
-from tests.gui.archives import ADA, Shown, play, record
+from tests.gui.archives import ADA, RATE_HZ, Shown, play, record
 from tests.gui.fakes import Bench
 from tests.support.desk import described, looked
 
@@ -174,6 +174,19 @@ def test_back_before_the_fault_its_line_says_that_there_was_none_then(
     assert player.alarms.isVisible(), "nothing moves"
 
 
+def test_at_its_very_instant_the_code_that_comes_later_is_known(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    """It sent people to the manual, and the list beside it had the code."""
+    shown.until(lambda: any("0x2310" in one.text for one in archive.playback.happened.flags), "found it")
+    to_the_fault(shown, archive, player, later_s=0.001)
+    shown.draw()
+    assert archive.playback.desk.stations[0].robot.values["left_knee.error_code"] == 0.0
+    said = player.alarms.headline.text()
+    assert "0x2310" in said
+    assert "a moment later" in said
+
+
 def test_its_signal_is_shown_before_and_after_the_fault(
     shown: Shown, archive: Archive, player: Player
 ) -> None:
@@ -188,6 +201,9 @@ def test_its_signal_is_shown_before_and_after_the_fault(
     assert not archive.playback.playing
     quantities = {name.removeprefix("left_knee.") for name in player.signals.chosen}
     assert {"current", "torque", "position", "velocity"} <= quantities, "all of that drive"
+    jump = player.signals._jump
+    assert jump is not None
+    assert 0 < jump.at_ns - jump.read_ns <= 1.5e9 / RATE_HZ, "the row before is read, which led to it"
     left, right = player.signals._window
     jump, newest_ns = player.signals._jump, player.signals.scene.newest_ns
     assert jump is not None
@@ -219,8 +235,8 @@ def test_a_replay_stands_at_the_fault_whose_signals_are_shown_and_says_its_alarm
     assert frozen is not None
     assert jump is not None
     assert frozen.newest_ns - jump.at_ns == pytest.approx(5e9, abs=2e8), "what comes after it is kept"
-    assert signals._read_s == (jump.at_ns - frozen.newest_ns) / 1e9, "values are those at it"
-    assert signals.plots[0].note == f"0:0{FAULT_S:.2f}", "as the axis below it counts"
+    assert signals._read_s == (jump.read_ns - frozen.newest_ns) / 1e9, "values are those just before it"
+    assert signals.plots[0].note == f"0:0{FAULT_S - 1 / RATE_HZ:.2f}", "as the axis below it counts"
     assert any(flag.kind is FlagKind.FAULT for flag in jump.flags)
 
 

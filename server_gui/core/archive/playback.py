@@ -23,7 +23,7 @@ from server_gui.core.archive.recorded_predictions import PastPrediction
 from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
-from server_gui.core.desk.flags import Flag, FlagKind
+from server_gui.core.desk.flags import Flag, FlagKind, fault_codes
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.follow.events import Described, LinkChanged, Telemetry
@@ -57,6 +57,7 @@ DRIVE_STATES: Final = {
         )
     )
 }
+LATER: Final = "which comes a moment later"  # the code of a fault
 KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
 
 
@@ -108,8 +109,11 @@ class PlayedRobot(Robot):
     def rate_hz(self, now_ns: int | None = None) -> float:  # noqa: ARG002 - a recording has its own now
         return self.rows_per_s
 
-    def judge(self) -> None:
-        """Show each component's state of that time, as far as its channels tell."""
+    def judge(self, codes: Mapping[str, int]) -> None:
+        """Show each component's state of that time, as far as its channels tell.
+
+        `codes` are those of the faults until then by the components' names, also where they come later.
+        """
         described = () if self.description is None else self.description.channels
         held = {info.component for info in described if self.values.get(info.name) is not None}
         for part in self.parts.values():
@@ -117,7 +121,9 @@ class PlayedRobot(Robot):
             if self.word(f"{part.name}.state") in FAULTS:
                 code = self.values.get(f"{part.name}.error_code")
                 state = "fault"
-                problem = f"the drive is in fault: {error_text(int(code))}" if code else ""
+                later = codes.get(part.name.replace("_", " "))
+                said = error_text(int(code)) if code else f"{error_text(later)}, {LATER}" if later else ""
+                problem = f"the drive is in fault: {said}" if said else ""
             elif part.name not in held and part.kind != "device":
                 state, problem = "lost", "the recording has no value of it here"
             self.parts[part.name] = replace(part, state=state, problem=problem)
@@ -295,7 +301,8 @@ class Playback:
         station.take([Telemetry(1, batch, None)])
         station.flags.add(*self._flags(rows))
         self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
-        self._robot.judge()
+        until_now = [flag for flag in self.happened.flags if flag.at_ns <= self._robot.row_ns]
+        self._robot.judge(fault_codes(until_now))
 
     def _flags(self, rows: Rows) -> Iterator[Flag]:
         """Yield the flags within these rows, or since those before, on their clock."""

@@ -19,6 +19,7 @@ KEPT: Final = 500
 SOON_NS: Final = 1_000_000_000  # after a fault: then its code is of it
 ASKED_FOR: Final = "asked for"  # with no word of by whom
 TAKEN_BACK: Final = "taken back"  # as the robot's journal has it
+CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 WINDOW: Final = re.compile(r"gwrms gui \((.+):\d+\)")
 HERE: Final = frozenset({"127.0.0.1", "[::1]", "::1"})
 JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
@@ -223,6 +224,16 @@ def _by(who: str) -> str:
     if window is None:
         return f"by {who}"
     return "from the window" if window[1] in HERE else f"from the window on {window[1]}"
+
+
+def fault_codes(flags: Iterable[Flag]) -> dict[str, int]:
+    """Return the code of the newest fault of each component, by its name for people; 0 where none is told."""
+    codes: dict[str, int] = {}
+    for one in flags:
+        if one.kind is FlagKind.FAULT:
+            found = CODE.search(one.text)
+            codes |= dict.fromkeys(_names(one.text), 0 if found is None else int(found[1], 16))
+    return codes
 
 
 def code_of(channel: str) -> str:

@@ -1,13 +1,59 @@
-"""What a reset, or a clearing of faults, came to, in words: what is still in fault is no success."""
+"""A reset, or a clearing of faults, and what it came to, in words: what is still in fault is no success."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from gateway.client import CallTimeout, LinkLost
 from gateway.wire.stop import Reset
 from server_gui.core.alarms.marks import Mark
+from server_gui.core.alarms.stop_alarms import go_on
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.tuning.commands import Commands
+from server_gui.core.tuning.stop import StopProgress, StopState
 
 RESET_MARK: Final = Mark("ring", "dim", "RESET")  # neither good nor bad: nothing is enabled by it
+
+
+class Resetting:
+    """Resets one robot; `tell` reports what came of it."""
+
+    def __init__(
+        self,
+        commands: Commands,
+        deliver: Deliver,
+        robot: Robot,
+        stopping: StopProgress,
+        tell: Callable[[NewsKind, str], None],
+    ) -> None:
+        self._commands, self._deliver = commands, deliver
+        self._robot, self._stopping, self._tell = robot, stopping, tell
+
+    def begin(self, failed: Callable[[str], None]) -> None:
+        """End a held stop, clear faults; enables nothing. `failed` is told what is still in fault."""
+        number = self._stopping.number
+
+        def refused(error: Exception) -> None:
+            self._tell(NewsKind.WARNING, f"reset: {error}")
+            failed(without_answer(error))
+
+        when_done(
+            self._commands.reset(), self._deliver, lambda reset: self._done(number, reset, failed), refused
+        )
+
+    def _done(self, number: int, reset: Reset, failed: Callable[[str], None]) -> None:
+        is_asked = self._stopping.state is StopState.SENT  # what is not answered is not reset
+        if is_asked or number != self._stopping.number:  # the journal tells which of them was last
+            self._tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
+            return
+        self._stopping.was_reset(reset.held)
+        said, stays = after_reset(reset, go_on(Kind.RESET, self._robot))
+        self._tell(NewsKind.STOP if reset.held or stays else NewsKind.RESET, said)
+        if stays:
+            self._tell(NewsKind.FAULT, stays)
+            failed(stays)
 
 
 def after_reset(reset: Reset, next_step: str) -> tuple[str, str]:

@@ -16,13 +16,12 @@ from gateway.wire.method import AnyMethod
 from gateway.wire.parameter import ParameterInfo, Written
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
-from gateway.wire.stop import Reset, Stopped
+from gateway.wire.stop import Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.drive_states import off_of_late
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.robot_alarms import Facts
-from server_gui.core.alarms.stop_alarms import go_on
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.watch import AlarmWatch
 from server_gui.core.alarms.worst_state import worst
@@ -30,7 +29,7 @@ from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.beyond_news import BeyondNews
 from server_gui.core.desk.flag_watch import FlagWatch, of_stop
 from server_gui.core.desk.flags import Flag, FlagKind, Flags
-from server_gui.core.desk.resetting import after_reset, without_answer
+from server_gui.core.desk.resetting import Resetting
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.writes_of_others import WritesOfOthers
 from server_gui.core.evidence.edit_list import EditList
@@ -118,6 +117,7 @@ class Station:
         self._beyond_news = BeyondNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
+        self._resetting = Resetting(commands, deliver, self.robot, self.stopping, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
 
     @property
@@ -176,10 +176,8 @@ class Station:
             self.stopping.was_ended = False
 
     def _facts(self) -> Facts:
-        danger, is_busy = self.predictions.danger, self.is_overloaded()
-        return Facts(
-            self.robot, self.stopping, self.address, self.audit.entries, danger=danger, is_overloaded=is_busy
-        )
+        known = (self.robot, self.stopping, self.address, self.audit.entries)
+        return Facts(*known, danger=self.predictions.danger, is_overloaded=self.is_overloaded())
 
     @property
     def mark(self) -> Mark:
@@ -360,25 +358,7 @@ class Station:
 
     def reset(self, failed: Callable[[str], None] = lambda _: None) -> None:
         """End a held stop, clear faults; enables nothing. `failed` is told what is still in fault."""
-        number = self.stopping.number
-
-        def done(reset: Reset) -> None:
-            is_asked = self.stopping.state is StopState.SENT  # what is not answered is not reset
-            if is_asked or number != self.stopping.number:  # the journal tells which of them was last
-                self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
-                return
-            self.stopping.was_reset(reset.held)
-            said, stays = after_reset(reset, go_on(Kind.RESET, self.robot))
-            self.tell(NewsKind.STOP if reset.held or stays else NewsKind.RESET, said)
-            if stays:
-                self.tell(NewsKind.FAULT, stays)
-                failed(stays)
-
-        def refused(error: Exception) -> None:
-            self.tell(NewsKind.WARNING, f"reset: {error}")
-            failed(without_answer(error))
-
-        when_done(self._commands.reset(), self._deliver, done, refused)
+        self._resetting.begin(failed)
 
     # --- the lease
 

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final
 
-from server_gui.core.desk.flags import Flag
+import numpy as np
+
+from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.scene import KEPT_S, Scene
 from server_gui.views.workspace.tools import SPANS_S
 
+SAME_S: Final = 1e-4  # rows that are no further apart are one
 Span = tuple[float, float]  # s until the newest row
 
 
@@ -16,6 +20,7 @@ class Jump:
     """`comes`: what lies within `around_s` after it has not all come, and is shown as it does."""
 
     at_ns: int  # on the robot's clock
+    read_ns: int  # of the row that is read: of a fault the one before, which shows what led to it
     around_s: float
     flags: list[Flag]  # what had happened in what was kept then
     comes: bool
@@ -59,7 +64,11 @@ def jump_to(scene: Scene, station: Station, stamp_ns: int, around_s: float) -> J
     if not frozen.times[0] - frozen.times[-1] <= at <= 0.0:
         return None
     comes = at + around_s > 0.0 and not station.robot.is_recording
-    return Jump(stamp_ns, around_s, list(station.flags), comes)
+    read_ns, flags = stamp_ns, list(station.flags)
+    if any(one.kind is FlagKind.FAULT and one.at_ns == stamp_ns for one in flags):
+        row = int(np.searchsorted(frozen.times - frozen.times[-1], at - SAME_S)) - 1
+        read_ns += round((frozen.times[row] - frozen.times[-1] - at) * 1e9) if row >= 0 else 0
+    return Jump(stamp_ns, read_ns, around_s, flags, comes)
 
 
 def event_beside(jump: Jump | None, station: Station, way: int) -> Flag | None:

@@ -354,7 +354,7 @@ class Signals(QWidget):
         newest_ns = self.scene.newest_ns
         if self._hover is not None or self._jump is None or newest_ns is None:
             return self._hover
-        return (self._jump.at_ns - newest_ns) / 1e9
+        return (self._jump.read_ns - newest_ns) / 1e9
 
     def _note(self) -> None:
         """Ask for a note of the instant at the active cursor, else of the newest row."""

@@ -112,10 +112,10 @@ def test_a_drive_in_fault_and_a_sensor_without_a_value_are_not_ok_in_a_recording
             "left_insole.force": [force],
         }
         robot.apply(Telemetry(1, Batch([1], columns, 0, 0, 0, 1, 1), None))
-        robot.judge()
+        robot.judge({})
         assert {part.name: part.state for part in robot.not_ok()} == wrong
     robot.values["left_knee.state"] = 7.0
-    robot.judge()
+    robot.judge({})
     assert robot.parts["left_knee"].problem == f"the drive is in fault: {error_text(0x2310)}"
 
 
