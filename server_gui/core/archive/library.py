@@ -51,13 +51,14 @@ class Library:
         self.reading = Background("store")
         self._deliver = deliver
         self._looking = False
+        self._look_again = False
         self._knocking = False
         self._knock_again = False
         self._known: dict[tuple[str, str], Session] = {}  # as they were when their store was last read
 
     def close(self, within_s: float) -> bool:
         """Look no more; False where a look under way hangs. Idempotent."""
-        self._knock_again = False
+        self._look_again = self._knock_again = False
         return self.reading.close(within_s)
 
     @property
@@ -74,7 +75,10 @@ class Library:
         """Look again where it is time, or at once."""
         wait_s = LOOK_S if self.found.problem is None else AGAIN_S
         due = self.looked_s is None or time.monotonic() - self.looked_s >= wait_s
-        if self._looking or not (now or due):
+        if self._looking:
+            self._look_again |= now  # what is under way may have begun before
+            return
+        if not (now or due):
             return
         self._looking = True
         settings = self.settings
@@ -121,6 +125,9 @@ class Library:
             self._known = {(each.robot, each.session): each for each in found.sessions}
         if found.is_reached:
             self.reach.listed(found.problem)
+        again, self._look_again = self._look_again, False
+        if again:
+            self.look(now=True)
         self._reached(found)
 
     def _failed(self, error: Exception) -> None:

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -54,6 +54,25 @@ def test_sessions_of_store_and_spool_are_one_list_newest_first(
     assert {each.table for each in found.usage} >= {"telemetry", "sessions", "labels", "events"}
     assert found.size_bytes > 0
     assert found.problem is None
+
+
+def test_who_asks_for_a_look_while_an_older_one_is_under_way_sees_what_came_since(
+    settings: ServerSettings,
+) -> None:
+    """What had just been recorded was listed ten seconds later."""
+    delivered: list[Callable[[], None]] = []
+    library = Library(settings, delivered.append)
+    library.look()
+    until(lambda: delivered)  # of a store that is empty, which nobody has taken yet
+    session = record(settings.store.url, settings.recorder.spool).session
+    library.look(now=True)
+    delivered.pop()()
+    before = library.found
+    until(lambda: delivered)
+    delivered.pop()()
+    assert (before.sessions, [one.session for one in library.found.sessions]) == ((), [session])
+    assert not library.is_looking
+    assert library.close(WAIT_S)
 
 
 def test_no_store_yet_is_no_problem(settings: ServerSettings) -> None:
