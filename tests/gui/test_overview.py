@@ -85,9 +85,13 @@ def test_phases_end_where_the_literature_says(percent: float, name: str) -> None
 
 
 def test_the_joint_table_shows_degrees_and_the_drive_state_in_words(theme: Theme, bench: Bench) -> None:
-    bench.station.take([looked(), telemetry([1], {"left_knee.position": [0.5], "left_knee.state": [4.0]})])
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {"left_knee.position": [0.5], "left_knee.state": [4.0]}
+    bench.station.take([looked(), telemetry([now_ns], columns, now_ns)])
     left_knee = cells(JointModel(bench.desk, theme), 1)
     assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6 / –"]
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", now_ns)])
+    assert cells(JointModel(bench.desk, theme), 1)[1] == "● was operation enabled"
 
 
 def test_another_unit_is_shown_at_once(theme: Theme, bench: Bench) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.amounts import counted
 from ml.registry.card import Card
 from ml.registry.pointers import Pointer
 from ml.registry.registry import Registry
@@ -79,7 +80,9 @@ class ModelChange:
     def _told(self, card: Card | None) -> str:
         if card is None:
             return "no model of its own" if self.robot else UNPROMOTED
-        return f"{self.names[card.id]} ({headline(card)} on people never seen)"
+        people = len(card.metrics.per_subject)
+        whom = f"{counted(people, 'person', 'people')} never seen" if people else "people never seen"
+        return f"{self.names[card.id]} ({headline(card)} on {whom})"
 
 
 def promotion(url: str, model: str, robot: str) -> ModelChange:

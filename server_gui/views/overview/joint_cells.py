@@ -87,7 +87,8 @@ def row_of(station: Station, joint: str, desk: Desk) -> list[Cell]:
     colour = colour_of(joint, station.alarms, mark.colour) if gone else mark.colour
     age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]
-    state = f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}"
+    was = "was " if word == ENABLED and not station.is_live else ""
+    state = f"{GLYPHS.get(mark.shape, '◆')} {was}{mark.word}{age}"
     return [
         Cell(joint.replace("_", " "), side if side in ("left", "right") else "text"),
         Cell(state, "old" if not station.is_live else colour),
