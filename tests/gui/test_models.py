@@ -162,6 +162,7 @@ def test_what_training_has_said_of_a_model_is_read_again_before_it_is_promoted(
     click(page.promote)
     shown.until(page.confirm.isVisible, "asked")
     assert "lack 12 of its channels" in page.confirm.words.text()
+    assert "on 1 person never seen)" in page.confirm.words.text()
 
 
 def test_classes_that_would_be_lost_stand_out_before_a_promotion_and_beside_the_other(
