@@ -42,6 +42,7 @@ def test_recordings_of_store_and_spool_are_listed_with_what_is_in_them(
 ) -> None:
     record(settings)
     record(settings, sent=False)
+    archive.library.look(now=True)
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")

@@ -12,7 +12,7 @@ from tests.gui.archives import ADA, Shown, record
 from tests.gui.fakes import Bench
 
 
-def compared(shown: Shown, settings: ServerSettings) -> ComparisonPage:
+def compared(shown: Shown, archive: Archive, settings: ServerSettings) -> ComparisonPage:
     """Two recordings, of which the second has another gain and tells no firmware."""
     setup = {"component/left_knee": "joint", "firmware/left_knee": "1.2", "object/gait.step_length": "gait m"}
     before, after = (
@@ -20,6 +20,7 @@ def compared(shown: Shown, settings: ServerSettings) -> ComparisonPage:
     )
     record(settings, facts=msgspec.structs.replace(ADA, parameters=before, setup=setup))
     record(settings, facts=msgspec.structs.replace(ADA, parameters=after, operator="Bert"))
+    archive.library.look(now=True)
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
@@ -45,7 +46,7 @@ def cells(page: ComparisonPage) -> list[list[str]]:
 def test_what_changed_is_listed_and_what_is_not_recorded_is_said(
     shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
-    page = compared(shown, settings)
+    page = compared(shown, archive, settings)
     shown.until(lambda: archive.compared.moved, "compared both walks")
     assert cells(page) == [
         ["parameter", "left_knee.gain", "2", "3"],
@@ -70,7 +71,7 @@ def test_a_store_that_cannot_be_read_is_said_and_nothing_is_shown_as_unchanged(
         raise OSError("the disk is away")
 
     monkeypatch.setattr("server_gui.core.archive.recording_comparison.Recordings", broken)
-    page = compared(shown, settings)
+    page = compared(shown, archive, settings)
     shown.until(lambda: archive.compared.problem, "told why not")
     shown.draw()
     assert page.unknown.text() == "Not known: the disk is away"
