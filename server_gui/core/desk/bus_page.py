@@ -10,7 +10,7 @@ from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.bus_alarms import bus_alarms
 from server_gui.core.alarms.marks import NOT_KNOWN, STATES, Mark, age_text
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.follow.missing_pdos import told_percent
+from server_gui.core.follow.missing_pdos import SOME_PERCENT, told_percent
 from server_gui.core.follow.robot import FollowedComponent
 from server_gui.core.processing.bus_health import BusHealthLevel, findings, node_level, of_load, rated
 from server_gui.core.processing.bus_senders import Talking, kinds, talking, total, whole_numbers
@@ -21,6 +21,7 @@ BEFORE: Final = "silent by now"  # names the frames of the last second that are 
 FILLS: Final = "most of the load"
 SILENT: Final = frozenset({"lost", "stale"})
 GONE: Final = frozenset({Kind.LOST, Kind.PART_STALE})  # alarms about parts that are silent
+FOR_NOW: Final = "for now"  # PDOs are missing: it is told of the node if that lasts
 UNANSWERED: Final = Mark("triangle", "warn", "no SDO answer")
 FEW_PDOS: Final = Mark("cross", "warn", "PDOs missing")  # as a gap of a recording; ▲ has a confirmed STOP
 _HEARTBEAT: Final = re.compile(r"heartbeat has been missing for (\d+(?:\.\d+)? \w+)")
@@ -202,6 +203,8 @@ def _row(
     percent = told_percent(node) or node.pdos_missing_percent  # what is told of it stands in its row, too
     is_known = percent is not None and not is_silent and (percent > 0.0 or talk is not None)
     missing = f"{percent:.1f} %" if is_known else UNKNOWN
+    if is_known and percent is not None and percent >= SOME_PERCENT and not told_percent(node):
+        missing = f"{missing}, {FOR_NOW}"
     return Row(str(node_id), names, mark, share, frames, sends, trips, str(node.sdo_timeouts), missing)
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
@@ -11,6 +11,7 @@ from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.bus_page import BEFORE, Row, lines, rows, told_kinds
 from server_gui.core.desk.stop_all import SENT, STOPPED
+from server_gui.core.follow.missing_pdos import WatchedNode
 from server_gui.core.follow.robot import FollowedComponent
 
 HIP = NodeInfo(1, ["left_hip"], 0.4, 1.0, 88, 0, 0, 0.0)
@@ -83,6 +84,14 @@ def test_missing_pdos_have_a_mark_of_their_own() -> None:
     mark = by_name(rows(missing, PARTS, told(), live=True))["left hip"].mark
     assert mark is not None
     assert (mark.word, mark.colour) == ("PDOs missing", "warn")
+    for percent, told_percent, said in (
+        (1.9, 0.0, "1.9 %, for now"),
+        (1.9, 1.9, "1.9 %"),
+        (0.4, 0.0, "0.4 %"),
+    ):
+        hip = WatchedNode(**asdict(HIP), told_percent=told_percent)
+        seen = replace(BUS, nodes=[replace(hip, pdos_missing_percent=percent), KNEE, GAIT])
+        assert by_name(rows(seen, PARTS, told(), live=True))["left hip"].missing == said
     assert mark.shape not in (STOPPED.shape, SENT.shape, STATES["ok"].shape)
 
 
