@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import math
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -245,6 +246,20 @@ def test_every_figure_is_there_at_every_width_and_none_is_cut(signals: Signals, 
             if not table.isColumnHidden(column):
                 assert table.columnWidth(column) >= table.sizeHintForColumn(column)
     assert view.below.isHidden() is (width == 1400)
+
+
+def test_cursors_begin_where_there_are_rows(signals: Signals, bench: Bench) -> None:
+    """A was in the part of ten seconds that a young link has not filled yet, and read nothing."""
+    other = bench.add("exo-02", 7421)
+    now_ns = time.monotonic_ns()
+    stamps_ns = [now_ns - 10_000_000 * row for row in range(200, -1, -1)]
+    other.take([described("exo-02"), telemetry(stamps_ns, {"left_knee.position": [0.1] * 201}, now_ns)])
+    bench.desk.select(other)
+    signals.refresh()
+    signals.cursors.click()
+    assert signals.two.at == pytest.approx([-4 / 3, -2 / 3], abs=0.02)
+    signals.refresh()
+    assert "–" not in {str(signals.measuring.table.item(0, column).text()) for column in (1, 2, 3)}  # type: ignore[union-attr]
 
 
 def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signals) -> None:

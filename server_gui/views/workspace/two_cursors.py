@@ -38,8 +38,11 @@ class TwoCursors:
         return not self.measuring.isHidden()
 
     def show(self, on: bool) -> None:
-        """Show them within what is in sight, with the table of what they read; or neither."""
+        """Show them within what is in sight of the rows, with the table of what they read; or neither."""
         left, right = self._area.in_sight(self._seconds())
+        times = seconds_ago(self._scene, self._seconds())
+        if len(times) and times[0] < right:
+            left = max(left, float(times[0]))
         self.at = [left + (right - left) * share for share in AT_FIRST]
         self.measuring.setVisible(on)
         if on:
