@@ -1,14 +1,17 @@
 """Panels stay as people have arranged them, whatever becomes of the window, its text and its robots."""
 
+from pathlib import Path
+
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 
 from gateway.wire.parameter import Written
+from server_gui.core.desk.desk import Desk
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench
-from tests.support.desk import looked, walking
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import described, looked, walking
 
 MINE = (260, 540)  # wide: robots and parameters, as somebody has made them
 
@@ -18,9 +21,11 @@ def arranged(window: MainWindow, bench: Bench) -> MainWindow:
     window.setUpdatesEnabled(True)  # its layouts come to rest as it is painted
     window.resize(1600, 900)
     bench.look_again([walking(20), looked()])
-    bench.draw(window)
+    for _ in range(3):
+        bench.draw(window)
     window.resizeDocks(window.docks[:2], MINE, Qt.Orientation.Horizontal)
-    bench.draw(window)
+    for _ in range(2):  # as it comes to rest, and what it has come to
+        bench.draw(window)
     assert widths(window) == MINE
     return window
 
@@ -44,6 +49,57 @@ def test_a_window_that_was_narrow_for_a_while_gives_them_their_widths_back(
     arranged._panels.restore(kept)
     bench.draw(arranged)
     assert widths(arranged) == MINE, "nor is what is kept over the end of the program squeezed"
+
+
+@pytest.mark.parametrize("least", [1200, 1280, 980])
+def test_so_does_one_that_is_dragged_narrow_and_wide(arranged: MainWindow, bench: Bench, least: int) -> None:
+    """Frames are drawn meanwhile: each would take what is squeezed for what somebody wants."""
+    there = range(1600, least - 1, -40)
+    for width in (*there, *reversed(there)):
+        arranged.resize(width, 900)
+        bench.draw(arranged)
+    for _ in range(2):
+        bench.draw(arranged)
+    assert widths(arranged) == MINE
+
+
+def test_what_is_hidden_while_pages_are_of_no_robot_is_hidden_after_a_narrow_window_too(
+    full_window: MainWindow, bench: Bench
+) -> None:
+    window = full_window
+    window.resize(1600, 900)
+    bench.look_again([walking(20), looked()])
+    for _ in range(3):
+        bench.draw(window)
+    window.tabs.look_at_recordings()
+    window.docks[2].hide()
+    bench.draw(window)
+    for width in (1000, 1600):
+        window.resize(width, 900)
+        for _ in range(2):
+            bench.draw(window)
+    assert not window.docks[2].isVisible()
+    assert window.docks[0].isVisible()
+    window.tabs.look_at(window.tabs.overview)
+    bench.draw(window)
+    assert window.docks[1].isVisible()
+
+
+def test_a_window_that_begins_without_a_robot_gives_its_first_one_panels_of_the_usual_size(
+    theme: Theme, tmp_path: Path
+) -> None:
+    """They were as wide as half of it."""
+    desk = Bench(Desk())
+    window = MainWindow(desk.desk, theme, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat))
+    window.resize(1440, 900)
+    window.show()
+    desk.draw(window)
+    assert widths(window) == (0, 0)
+    desk.add("exo-01").take([described(), walking(20), looked()])
+    for _ in range(3):
+        desk.draw(window)
+    assert widths(window) == (190, 492)
+    destroy(window)
 
 
 def test_so_does_one_whose_last_robot_went_for_a_while(arranged: MainWindow, bench: Bench) -> None:

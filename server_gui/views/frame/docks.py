@@ -56,7 +56,10 @@ class Docks(QObject):
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
         self._is_put_away_for_room = False
-        self._sizes: dict[QDockWidget, QSize] = {}  # in the last frame in which all had room
+        self._sizes: dict[QDockWidget, QSize] = {}  # as people have made them
+        self._given: dict[QDockWidget, QSize] | None = None  # what they have since the window has this width
+        self._given_width = 0
+        self._seen: list[QDockWidget] = []  # that are shown where all have room, or have given way
         self._is_held, self._held = False, list[QDockWidget]()
         self._gave_way: list[QDockWidget] = []
         self._size()
@@ -81,7 +84,7 @@ class Docks(QObject):
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
-        self._gave_way = []
+        self._gave_way, self._sizes, self._given = [], {}, None
         self._roomy = self._usual
         self.restore(self._usual)
         for dock in shown:
@@ -90,15 +93,39 @@ class Docks(QObject):
             self._stack()
 
     def settle(self) -> None:
-        """Keep how they are arranged, in a frame in which they have room and nobody resizes the window.
+        """Keep how people have arranged them, where they have room; called once a frame.
 
-        While that is made narrow Qt squeezes them: what is squeezed is not what people have arranged.
+        As the window is made narrow Qt squeezes them. That is not what people have arranged: with each width
+        of the window they have their sizes again, and what is other than that later was moved by somebody.
         """
-        if not self.is_narrow and self.has_room and not self._is_held and not self._gave_way:
-            self._roomy = self._window.saveState(LAYOUT)
-            self._sizes = {dock: dock.size() for dock in self._in_sight}
+        if not self.is_narrow and self.has_room and not self._is_held and self._window.isVisible():
+            self._keep()
         for bar in self._window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
             bar.setFocusPolicy(Qt.FocusPolicy.TabFocus if bar.count() else Qt.FocusPolicy.NoFocus)
+
+    def _keep(self) -> None:
+        sizes = {dock: dock.size() for dock in self._in_sight}
+        if self._window.width() != self._given_width:
+            self._given_width, self._given = self._window.width(), None
+            self._size()
+            return
+        before = self._given or sizes
+        self._sizes |= {
+            dock: size
+            for dock, size in sizes.items()
+            if self._wide_or_high(dock, size) != self._wide_or_high(dock, before.get(dock, size))
+        }
+        self._given = sizes
+        self._seen = [*self._in_sight, *self._gave_way]
+        if not self._gave_way:
+            self._roomy = self._window.saveState(LAYOUT)
+
+    def _wide_or_high(self, dock: QDockWidget, size: QSize) -> int:
+        """Return the one of both that people choose: what is beside the pages is as high as these."""
+        return size.width() if self._is_beside(dock) else size.height()
+
+    def _is_beside(self, dock: QDockWidget) -> bool:
+        return bool(self._window.dockWidgetArea(dock) & (Area.LeftDockWidgetArea | Area.RightDockWidgetArea))
 
     def put_away(self) -> None:
         """Leave all the room to the tabs; or, where that is so, show what was there again."""
@@ -127,7 +154,8 @@ class Docks(QObject):
         """Hide them as long as there is nothing for them to show; return whether they are shown again."""
         if is_held is self._is_held:
             return False
-        self.settle()
+        if is_held:
+            self.settle()
         self._is_held = is_held
         if is_held:
             self._held = [*self._in_sight, *self._gave_way]
@@ -136,7 +164,7 @@ class Docks(QObject):
             dock.setVisible(not is_held)
         if not is_held:
             self._held = []
-            self._size_as_before()
+            self._size()
         return not is_held
 
     def bring(self, dock: QDockWidget) -> None:
@@ -164,6 +192,8 @@ class Docks(QObject):
 
     def fit(self, *, scaled: bool = False) -> None:
         """Arrange them for the room that there is; where text has another size, as wide as it needs."""
+        if scaled:
+            self._sizes = {}
         was_held = self._is_held
         if self.has_room is self.is_narrow:
             self.hold_back(is_held=False)
@@ -234,32 +264,19 @@ class Docks(QObject):
         ]  # never above: its title could be off the screen
         dock.move(frame.x(), min(free, key=lambda y: (y > lowest, abs(y - frame.y()))))
 
-    def _size_as_before(self) -> None:
-        """As large as people have made them, where all of them have been seen."""
-        if self.is_narrow or not self._sizes:
-            self._size()
-            return
-        beside = Area.LeftDockWidgetArea | Area.RightDockWidgetArea
-        for way, is_beside, size in (
-            (Qt.Orientation.Horizontal, True, QSize.width),
-            (Qt.Orientation.Vertical, False, QSize.height),
-        ):
-            docks = [
-                dock
-                for dock in self._sizes
-                if not dock.isHidden() and bool(self._window.dockWidgetArea(dock) & beside) is is_beside
-            ]
-            self._window.resizeDocks(docks, [size(self._sizes[dock]) for dock in docks], way)
-
     def _size(self) -> None:
+        """As wide and high as people have made them; the others as usual."""
         px = self._theme.px
         if self.is_narrow:
             self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
             return
         self._widths = self._usual_widths
-        self._window.resizeDocks(self.all[:2], [px(wide) for wide in self._widths], Qt.Orientation.Horizontal)
         high = BELOW[0] if self._window.height() >= px(HIGH) else BELOW[1]
-        self._window.resizeDocks(self.all[2:3], [px(high)], Qt.Orientation.Vertical)
+        usual = dict(zip(self.all, (*map(px, self._widths), px(high)), strict=False))
+        sizes = usual | {dock: self._wide_or_high(dock, size) for dock, size in self._sizes.items()}
+        for way, is_beside in ((Qt.Orientation.Horizontal, True), (Qt.Orientation.Vertical, False)):
+            docks = [dock for dock in sizes if self._is_beside(dock) is is_beside]
+            self._window.resizeDocks(docks, [sizes[dock] for dock in docks], way)
 
     @property
     def _usual_widths(self) -> tuple[int, int]:
@@ -288,6 +305,10 @@ class Docks(QObject):
         for dock in self.all:
             self._give_title(dock)
         self.restore(self._roomy)
+        for dock in self._seen and self.all:
+            dock.setVisible(dock in self._seen)
+        self._size()
+        self._given_width = 0  # and with the next frame, which knows how wide the window is
 
     def _give_title(self, dock: QDockWidget, bar: QWidget | None = None) -> None:
         """Give it this title bar; by default the usual one, with the tools of its panel where it has some."""
