@@ -29,6 +29,7 @@ FOLLOWING = FollowSettings(
     channels=("*.position", "*.state", "*.error_code", "*.force", "*.tilt_forward", "*.tilt_side"),
     parameters=("gait.*",),
     resources=ResourceSnapshotParams(processes=False),
+    journal_s=2.0,  # which tells who has ended a stop
 )
 EVERY_PARAMETER = replace(FOLLOWING, client="gwrms top", parameters=("*",))
 PROCESSES = ResourceSnapshotParams(limit=8)

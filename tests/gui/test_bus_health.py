@@ -14,6 +14,7 @@ from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.finding import FindingInfo
 from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.desk.frame_rate import FrameRate
 from server_gui.core.follow.events import BusesSeen, Described, Looked
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
@@ -284,6 +285,25 @@ def test_few_frames_a_second_are_a_busy_computer_on_the_last_line(
     is_busy = "busy" in said
     assert all("busy" in wording for wording in bar._window._wordings[:2]) is is_busy
     assert all("▲" in wording for wording in bar._window._wordings) is is_busy
+
+
+def test_frames_are_slow_for_a_while_and_a_pause_is_none() -> None:
+    rate, now_s = FrameRate(), 0.0
+
+    def draw(every_s: float, frames: int) -> bool:
+        nonlocal now_s
+        for _ in range(frames):
+            now_s += every_s
+            rate.count(now_s)
+        return rate.is_slow()
+
+    assert not draw(0.033, 60)
+    now_s += 60.0  # this computer slept
+    assert not draw(0.033, 10)
+    assert draw(0.2, 60)
+    assert draw(1 / 9, 60), "it would flicker about its limit"
+    assert not draw(0.033, 60)
+    assert not draw(1 / 9, 60)
 
 
 def test_the_page_of_the_window_lists_the_columns_and_the_order_in_which_they_go() -> None:

@@ -283,7 +283,13 @@ def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
     shown = cells(JointModel(bench.desk, theme), 1)
     assert shown[ERROR] == "0x2310 continuous overcurrent at the output"
     assert shown[TORQUE] == "0.00 / 80"
-    assert shown[2] == "0.0 / off", "it goes to no target"
+    assert shown[2] == "0.0 / –", "it goes to no target"
+    for state, aim in ((6.0, "off"), (5.0, "–"), (4.0, "+0.0")):
+        columns |= {"left_knee.state": [state], "left_knee.target_position": [0.0001]}
+        bench.station.take([telemetry([received_ns], columns, received_ns), looked()])
+        assert cells(JointModel(bench.desk, theme), 1)[2].split(" / ")[1].lstrip("+") == aim.lstrip("+"), (
+            "it brakes"
+        )
     assert cells(JointModel(bench.desk, theme), 0)[ERROR] == "–"
 
 

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from gateway.client import ConnectionState, NotConnected
-from gateway.wire.parameter import Written
+from gateway.wire.parameter import Confirmed, Written
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
@@ -96,3 +96,26 @@ def test_what_writes_is_whole_in_a_review_of_any_width(window: MainWindow, bench
     for control in (review.try_it, review.seconds, review.write_it):
         assert control.width() >= control.minimumSizeHint().width()
         assert control.visibleRegion().boundingRect() == control.rect()
+
+
+def test_a_late_answer_about_a_trial_is_none_about_the_next(panel: ParametersPanel, bench: Bench) -> None:
+    """Trial 8 was called kept, with no way to keep it or take it back, as the answer about 7 came."""
+    before, after = {"gait.step_length": 0.4}, {"gait.step_length": 0.43}
+    writing = bench.station.writing
+    writing.done(Written(7, before, after, trial_s=20.0))
+    panel.trial.keep.emit()
+    panel.trial.take_back.emit()
+    keep, back = bench.first.futures[-2:]
+    keep.set_exception(NotConnected("too late"))
+    assert writing.failed_ask == "", "something else was asked since"
+    back.set_exception(NotConnected("no link"))
+    assert writing.failed_ask == "NOT taken back"
+    panel.trial.keep.emit()
+    panel.trial.keep.emit()
+    late, failing = bench.first.futures[-2:]
+    writing.done(Written(8, before, after, trial_s=20.0))
+    assert writing.failed_ask == ""
+    late.set_result(Confirmed(7, after))
+    failing.set_exception(NotConnected("too late"))
+    assert writing.trial is not None
+    assert (writing.trial.write, writing.failed_ask) == (8, "")

@@ -9,6 +9,7 @@ from typing import Final
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, UNSTOPPED, Kind
 
+HOTTER: Final = 10  # °C: so much more is to be read again
 NEWER_S: Final = 1.0  # a stop that is so much later is another one, to be read again
 ASIDE: Final = re.compile(r" \([^()]*\)$")
 GRAVER: Final = {Kind.PART_STALE: "component silent", Kind.STALLED: "computer halted"}
@@ -187,11 +188,19 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, is_acknowledged=is_read)
     if alarm.kind is Kind.STALE and alarm.since_s is not None and alarm.since_s > before.since_s:
         return dataclasses.replace(before, alarm=alarm, since_s=alarm.since_s, at_ns=newest_ns)
-    was = before.alarm.grade
-    if alarm.kind is Kind.HOT:
-        alarm = dataclasses.replace(alarm, grade=max(alarm.grade, was))
-    is_read = before.is_acknowledged and alarm.grade == was
+    grade, is_read = _graded(before, alarm)
+    alarm = dataclasses.replace(alarm, grade=grade)
     return dataclasses.replace(before, alarm=alarm, is_acknowledged=is_read)
+
+
+def _graded(before: Active, alarm: Alarm) -> tuple[int, bool]:
+    """Return its code, or the heat that was read last or is the most, and whether it stays read."""
+    was, now = before.alarm.grade, alarm.grade
+    if alarm.kind is not Kind.HOT:
+        return now or was, before.is_acknowledged and now in (0, was)  # 0: not known
+    if before.is_acknowledged and now < was + HOTTER:
+        return was, True
+    return max(now, was), False
 
 
 def _order(one: Active) -> tuple[bool, int, float]:

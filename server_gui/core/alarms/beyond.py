@@ -22,7 +22,6 @@ LEANING: Final = {"tilt_forward": ("forward", "backward"), "tilt_side": ("to a s
 TRUNK: Final = "trunk"
 HOT: Final = 85.0  # °C: few drives are rated for more, and their electronics age fast
 SLACK: Final = math.radians(2.0)  # by which a joint may overshoot an end
-HOTTER: Final = 10.0  # °C: so much more is news
 SEES: Final = ("watching", "cleared")  # states of a rule that can trip
 LEFT_S: Final = 10.0  # that a value beyond its limit is left to a rule that does not trip
 HELD_S: Final = 5.0  # what swings about its limit is one alarm, not one a stride
@@ -41,6 +40,15 @@ class FoundBeyond:
     is_watched: bool = False  # by a rule of the guard, which has not tripped
 
 
+@dataclass(frozen=True, slots=True)
+class Left:
+    """One that is left to the guard, since when, and when it was seen last (s)."""
+
+    one: FoundBeyond
+    since_s: float
+    seen_s: float
+
+
 Key = tuple[Kind, str, str]
 Seen = tuple[FoundBeyond, float | None]  # and since when (s) its value is within again
 
@@ -50,15 +58,19 @@ class Beyond:
 
     def __init__(self) -> None:
         self._seen: dict[Key, Seen] = {}
-        self._left_s: dict[Key, float] = {}  # to the guard, since when
+        self._left: dict[Key, Left] = {}  # to the guard
 
     def look(self, robot: Robot, *, is_off: bool = False) -> tuple[FoundBeyond, ...]:
         """Return what is beyond its limit now; what was last known so stays while nothing is known.
 
         A robot with every drive off (`is_off`) may be laid down; one that has fallen before has still.
         """
-        if robot.is_stale():
-            return () if robot.is_recording else self._of(robot)
+        if robot.is_stale() and robot.is_recording:
+            return ()
+        if robot.is_stale():  # whether the guard says so still nobody knows either
+            for key, left in self._left.items():
+                self._seen.setdefault(key, (replace(left.one, is_now=False), None))
+            return self._of(robot)
         now_s = now_ns() / 1e9
         beyond = {(one.kind, one.component, one.quantity): one for one in _found(robot)}
         found: dict[Key, Seen] = {
@@ -67,7 +79,7 @@ class Beyond:
             if key in self._seen
             or not ((is_off and one.kind is Kind.FALLEN) or self._is_left(robot, key, one, now_s))
         }
-        self._left_s = {key: since_s for key, since_s in self._left_s.items() if key in beyond}
+        self._left = {key: left for key, left in self._left.items() if now_s - left.seen_s < HELD_S}
         if not robot.is_recording:  # whose instant goes to and fro
             kept = {key: _fading(robot, now_s, *seen) for key, seen in self._seen.items()}
             found = {key: seen for key, seen in kept.items() if seen is not None} | found
@@ -78,7 +90,9 @@ class Beyond:
         """Return whether its rule is to say so, and still may: some wait for long, or for ever."""
         if not one.is_watched:
             return False
-        return robot.is_recording or now_s - self._left_s.setdefault(key, now_s) < LEFT_S
+        since_s = self._left[key].since_s if key in self._left else now_s
+        self._left[key] = Left(one, since_s, now_s)
+        return robot.is_recording or now_s - since_s < LEFT_S
 
     def _of(self, robot: Robot) -> tuple[FoundBeyond, ...]:
         """Return one of each kind and component: what is known to be so goes before."""
@@ -143,7 +157,7 @@ def _hot(robot: Robot, name: str) -> Iterator[FoundBeyond]:
         if _watch(robot, name, "temperature", temperature, math.inf) is not Watch.NONE:
             return  # who wrote it knows the drive
         what = f"{temperature:.1f} °C, hot from {HOT:.0f} °C on"
-        yield FoundBeyond(Kind.HOT, name, "temperature", what, grade=int(temperature // HOTTER))
+        yield FoundBeyond(Kind.HOT, name, "temperature", what, grade=round(temperature))
 
 
 def _value(robot: Robot, name: str, quantity: str) -> float | None:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from server_gui.core.alarms.drive_states import FAULTY, any_enabled, state_words
+from server_gui.core.alarms.drive_states import FAULTY, state_words
 from server_gui.core.alarms.unconfirmed import enabled_again
 from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import StopProgress, StopState, is_off
@@ -28,9 +28,9 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
 
 
 def is_driven(robot: Robot, stopping: StopProgress) -> bool:
-    """Return whether it may drive its wearer: also where some drives are in fault or stop, not all."""
+    """Return whether it may drive its wearer: also where not every drive is known to be in fault or stop."""
     why = undriven(robot, stopping)
-    return not why or (why in (STOPPING, IN_FAULT) and any_enabled(robot))
+    return not why or (why in (STOPPING, IN_FAULT) and not all(map(is_off, state_words(robot).values())))
 
 
 def is_idle(robot: Robot, stopping: StopProgress) -> bool:

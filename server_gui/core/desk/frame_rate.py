@@ -6,6 +6,7 @@ from typing import Final
 
 KEPT: Final = 60  # frames that are averaged
 LEAST: Final = 5  # before which nothing is said of the rate: a window that opens is slow
+PAUSE_S: Final = 5.0  # between two frames is no rate
 SLOW: Final = 8.0  # frames a second, below which this computer is busy, whatever else it does
 FAST: Final = 10.0  # from which it is not any more, so that no words flicker
 
@@ -19,7 +20,10 @@ class FrameRate:
 
     def count(self, now_s: float | None = None) -> None:
         """Count one that is drawn, at an instant of our monotonic clock."""
-        self._drawn_s.append(time.monotonic() if now_s is None else now_s)
+        now_s = time.monotonic() if now_s is None else now_s
+        if self._drawn_s and now_s - self._drawn_s[-1] > PAUSE_S:
+            self._drawn_s.clear()  # this computer slept, or the window was hidden
+        self._drawn_s.append(now_s)
         rate = self.per_second
         self._is_slow = rate is not None and rate < (FAST if self._is_slow else SLOW)
 

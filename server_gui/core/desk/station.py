@@ -294,7 +294,8 @@ class Station:
             self.tell(NewsKind.WARNING, news.text)
             self.flags.add(Flag(news.cause.prediction.stamp_ns, news.text, FlagKind.RULE))
         if isinstance(news, Endangered):
-            level = Level.NONE if before is None else before.said.verdict.level
+            is_new = before is None or not before.came_ns  # that of before a lost link is told again
+            level = Level.NONE if before is None or is_new else before.said.verdict.level
             if (happened := turn(level, news.verdict)) is not None:
                 self.tell(NewsKind.WARNING, happened)
                 self.flags.add(Flag(news.verdict.stamp_ns, happened, FlagKind.DANGER))
@@ -436,14 +437,24 @@ class Station:
             )
 
     def _decide(self, future: "Future[Result]", done: Callable[[Result], None], what: str) -> None:
-        """Ask for the end of a trial; where that fails, it is said where its countdown is."""
-        self.writing.asked()
+        """Ask for the end of a trial; where that fails, it is said where its countdown is.
+
+        An answer that comes when another one is on trial, or something else was asked of it since, is told.
+        """
+        trial, number = self.writing.trial, self.writing.asked()
+
+        def answered(result: Result) -> None:
+            if self.writing.trial is trial:
+                done(result)
+            else:
+                self.tell(NewsKind.PARAMETER, f"{what}: answered late, of a trial before")
 
         def failed(error: Exception) -> None:
             self.tell(NewsKind.WARNING, f"{what}: {error}")
-            self.writing.not_done(NOT_DONE[what], str(error))
+            if self.writing.trial is trial and number == self.writing.asks:
+                self.writing.not_done(NOT_DONE[what], str(error))
 
-        when_done(future, self._deliver, done, failed)
+        when_done(future, self._deliver, answered, failed)
 
     def stage_undo(self) -> None:
         """Stage the inverse of the latest write, to be reviewed and written like any edit."""

@@ -68,7 +68,7 @@ class RobotNews:
             if part.comes_up:
                 continue
             before = self._parts.get(part.name, "ok")
-            if part.state == "ok":
+            if part.state not in (before, "fault"):
                 self._told.pop(part.name, None)
             if part.state != before and not self._is_told(part):
                 why = f": {part.problem}" if part.problem else ""
@@ -97,6 +97,8 @@ class RobotNews:
                 len(joints) == 1 and kind is NewsKind.FAULT and joints[0] in errors
             ):  # one cause is one event
                 self._tell(kind, f"{names}: {errors.pop(joints[0])} ({change})", joints[0])
+            elif kind is NewsKind.FAULT and self._told.keys() >= {*joints} and not errors.keys() & {*joints}:
+                continue  # the robot has said so, with its code
             elif len(joints) > FEW:  # the change first: names have no room where there is little
                 self._tell(kind, f"{len(joints)} of {every} drives: {change} ({names})")
             else:

@@ -222,7 +222,7 @@ class StopProgress:
             self.proofs, self.was_ended = {}, False
             self.since_s = None  # the journal, or our own STOP, tells since when
         self.held, self.reason = held, (reason or "") if held else ""
-        self.problem = problem or "" if held else self.problem
+        self.problem = (problem or "") if held else ""
         self._told_s = time.time() if held and self.state is StopState.IDLE else None
 
     def read(self, entries: Iterable[Mapping[str, Any]], boot_id: str | None = None) -> None:
@@ -236,12 +236,15 @@ class StopProgress:
             self._entry = 0  # another journal
         is_open = self.state is StopState.NOT_CONFIRMED and not self.held
         was_ended, is_history, is_older = self.was_ended, self._entry == 0, False
+        is_lost, held = False, (self.reason, self.problem)  # the stop that is held was in no journal
         for number, entry in told:
             if number <= self._entry:
                 continue
             self._entry = number
-            if is_history and self._is_before_its_word(entry):
-                continue
+            if entry.get("what") in HELD_BY:
+                is_lost = False
+            elif _is_reset(entry):
+                is_lost = is_history and self._is_before_its_word(entry)
             if self._is_after(entry, boot_id):
                 self._read(entry, is_open=is_open)
             elif entry.get("what") in HELD_BY and not self.held:  # held still, as far as is read
@@ -249,13 +252,15 @@ class StopProgress:
                 self.held, self.reason, is_older = True, _said(entry), True
             elif is_older and _is_reset(entry):
                 self.held, self.reason, is_older = False, "", False
+        if is_lost and not self.held:
+            self.held, (self.reason, self.problem), self.since_s, self._stood_s = True, held, None, None
         self._reads += 1
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since
 
     def _is_before_its_word(self, entry: Mapping[str, Any]) -> bool:
         """Return whether a reset is older than the robot's own word: a stop since may be in no journal."""
-        if self._told_s is None or not _is_reset(entry):
+        if self._told_s is None:
             return False
         return "utc_ns" not in entry or self._utc_s(entry) < self._told_s - CALENDAR_S
 
@@ -424,6 +429,8 @@ class StopProgress:
     def _holds(self, entry: Mapping[str, Any]) -> None:
         if not self.held or not self.reason:
             self.reason = _said(entry)
+        if not self.held:
+            self.problem = ""  # of one before
         if not self.held or self.since_s is None:
             self._stood_s = self._utc_s(entry)
             if self.state is not StopState.NOT_CONFIRMED:  # which is since ours, whoever holds another

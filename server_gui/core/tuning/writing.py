@@ -60,6 +60,7 @@ class WriteProgress:
     trial: Trial | None = None
     failed_ask: str = ""  # what of a trial was asked for and not done: to keep it, or take it back
     why_failed: str = ""
+    asks: int = 0
     undo: collections.deque[Mapping[str, Number]] = field(
         default_factory=lambda: collections.deque(maxlen=UNDO)
     )
@@ -116,10 +117,12 @@ class WriteProgress:
             self.undo.append(self.trial.before)
             self._end_trial("kept: the trial's values stay")
 
-    def asked(self) -> None:
-        """Note that a trial is to be kept, or taken back."""
+    def asked(self) -> int:
+        """Note that a trial is to be kept, or taken back; return the number of this wish."""
         self.failed_ask = self.why_failed = ""
         self.revision += 1
+        self.asks += 1
+        return self.asks
 
     def not_done(self, what: str, why: str) -> None:
         """Note that the robot did not, or has not said that it did: the trial goes on, as far as is known."""

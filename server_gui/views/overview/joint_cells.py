@@ -49,7 +49,8 @@ CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
 NOT_KNOWN: Final = "not known"
-OFF: Final = "off"  # instead of a target
+OFF: Final = "off"  # instead of a target, of a drive that neither holds nor brakes (CiA 402-2)
+WITHOUT_POWER: Final = frozenset({"not ready to switch on", "switch on disabled", "ready to switch on"})
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 
 
@@ -118,9 +119,9 @@ def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     unit = unit_of(desk, "position")
     position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
     word = station.robot.word(f"{joint}.state")
-    if goes_nowhere := not stale and is_off(word):
-        target = None
-    aim = OFF if goes_nowhere else _text(unit, "position", target)
+    if not stale and is_off(word):
+        target = None  # it goes to none
+    aim = OFF if not stale and word in WITHOUT_POWER else _text(unit, "position", target)
     text = f"{_text(unit, 'position', position)} / {aim}"
     beyond = next((one for one in _of_values(station, joint) if one.kind is Kind.BEYOND), None)
     known = "text" if beyond is None else beyond.mark.colour

@@ -21,7 +21,7 @@ OF_CURSORS: Final = (1, 2, 3)
 NAME: Final = 220  # wide at least, at text of 100 %: a channel; a narrower table is scrolled
 ROWS, FEW_ROWS = 6, 4  # that are in sight at most, of one table and of two
 FAR: Final = 10  # samples, with Shift
-LARGE, LARGEST = 1e5, 1e12  # between them numbers have all their whole digits
+LARGEST: Final = 1e12  # smaller ones have all their whole digits
 KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
 STEPS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
@@ -146,7 +146,8 @@ def _text(unit: Unit, value: float | None) -> str:
 
 
 def _number(shown: float) -> str:
-    return f"{shown:.0f}" if LARGE <= abs(shown) < LARGEST else f"{shown:.5g}"
+    text = f"{shown:.5g}"
+    return f"{shown:.0f}" if "e+" in text and abs(shown) < LARGEST else text
 
 
 def apart(unit: Unit, one: float | None, other: float | None) -> float | None:

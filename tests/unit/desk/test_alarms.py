@@ -319,6 +319,13 @@ def test_what_the_drive_and_the_robot_say_of_one_fault_is_said_once_each_time_it
 
     both = [by_the_drive, by_the_robot]
     row(4.0, 0.0)
+    for one in (both[1], both[0]) if first != "the drive" else ():
+        one()
+        assert len([text for text in told if "fault" in text]) == 1, "nor is its state told then"
+    told.clear()
+    row(4.0, 0.0)
+    word("ok")
+    told.clear()
     for count in (1, 2):
         for one in both if first == "the drive" else reversed(both):
             one()
@@ -329,6 +336,9 @@ def test_what_the_drive_and_the_robot_say_of_one_fault_is_said_once_each_time_it
         word("ok")
     word("fault", in_fault.replace("0x2310", "0x4210"))
     assert faults("0x4210") == 1
+    for state in ("lost", "fault"):
+        word(state, in_fault.replace("0x2310", "0x4210"))
+    assert faults("0x4210") == 3, "it was lost meanwhile: the lost part's words, and it is in fault again"
     word("ok")
     word("fault", "its values cannot be: no code")
     assert faults("no code") == 1

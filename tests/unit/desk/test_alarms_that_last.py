@@ -146,3 +146,13 @@ def test_what_is_not_known_now_is_no_alarm_of_now(bench: Bench, monkeypatch: pyt
     station.take([])
     for kind in (Kind.FAULT, Kind.GUARD):
         assert not the(bench, kind).alarm.is_now
+
+
+def test_a_code_that_is_not_known_for_a_row_makes_no_alarm_unread(bench: Bench) -> None:
+    station, reads = bench.station, list[bool]()
+    for code in (float(0x2310), None, float(0x2310), 0.0):
+        station.take([row(left_knee__state=7.0, left_knee__error_code=code)])
+        if the(bench, Kind.FAULT).alarm.grade and not reads:
+            station.acknowledge(the(bench, Kind.FAULT).alarm)
+        reads.append(the(bench, Kind.FAULT).is_acknowledged)
+    assert reads == [True] * 4

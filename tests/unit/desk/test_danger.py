@@ -107,20 +107,30 @@ def test_a_blink_of_the_link_ends_no_danger_and_another_start_does(station: Stat
     assert station.predictions.danger is None, "it was none to look at"
 
 
-@pytest.mark.parametrize("others", [4.0, 5.0])
+def test_danger_that_goes_on_after_the_link_was_lost_is_an_event_again(station: Station) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    before = len([flag for flag in station.flags if flag.kind is FlagKind.DANGER])
+    station.take_prediction(endangered(Level.ALARM, stamp_ns=9 * 10**9))
+    assert len([flag for flag in station.flags if flag.kind is FlagKind.DANGER]) == before + 1
+
+
+@pytest.mark.parametrize("others", [4.0, 5.0, None])
 @pytest.mark.parametrize("one", [5.0, 7.0])
 def test_one_drive_that_stops_does_not_end_the_danger_of_those_that_go_on(
-    station: Station, one: float, others: float
+    station: Station, one: float, others: float | None
 ) -> None:
     station.take_prediction(endangered(Level.ALARM))
     columns: dict[str, list[float | None]] = {f"{joint}.state": [others] for joint in JOINTS}
     station.take([telemetry([time.monotonic_ns()], {**columns, "left_knee.state": [one]})])
-    assert (Kind.DANGER in {kind for kind, _ in told(station)}) is (others == 4.0)
+    assert (Kind.DANGER in {kind for kind, _ in told(station)}) is (others != 5.0)
 
 
 def test_a_stop_that_is_not_confirmed_ends_no_danger_while_drives_are_enabled(station: Station) -> None:
     station.take_prediction(endangered(Level.ALARM))
     stopping = station.stopping
+    stopping.described(True, "somebody's")
+    assert undriven(station.robot, stopping) == HELD
     number = stopping.sent()
     assert undriven(station.robot, stopping) != HELD
     stopping.answered(number, Stopped(dict.fromkeys(JOINTS, "unconfirmed"), held=True))

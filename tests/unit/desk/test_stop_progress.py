@@ -405,3 +405,35 @@ def test_rows_that_come_late_correct_since_when_it_has_stood() -> None:
     enabled: dict[str, list[str | None]] = {"left_knee": ["operation enabled", "quick stop active"]}
     stopping.show([10**12 - 10**9, 10**12 + 20_000_000], enabled, 0)
     assert stopping.since_s > 1000.0, "it had been enabled"
+
+
+def test_a_stop_that_the_robot_holds_is_as_old_as_its_own_entry_not_as_one_that_was_reset() -> None:
+    """With a history of two hours, STOPPED was since the oldest stop in it."""
+    stopping = StopProgress()
+    stopping.described(held=True, reason="door")
+    now_s = time.time()
+    past = [(1, "stop", 7200.0), (2, "reset", 7100.0), (3, "stop", 120.0)]
+    stopping.read(
+        [
+            written(
+                number,
+                what,
+                utc_ns=round((now_s - ago_s) * 1e9),
+                **({"held": False} if what == "reset" else {}),
+            )
+            for number, what, ago_s in past
+        ]
+    )
+    assert stopping.held
+    assert stopping.since_s == pytest.approx(now_s - 120.0, abs=1.0)
+
+
+def test_what_was_wrong_with_a_stop_that_is_over_is_not_said_of_the_next() -> None:
+    stopping = StopProgress()
+    stopping.described(held=True, reason="door", problem="not beyond this gateway")
+    stopping.described(held=False, reason=None)
+    assert stopping.problem == ""
+    stopping.described(held=True, reason="door", problem="not beyond this gateway")
+    stopping.held = False
+    stopping.read([written(1, "stop", reason="other")])
+    assert (stopping.held, stopping.problem) == (True, "")
