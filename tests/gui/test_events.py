@@ -165,7 +165,7 @@ def test_a_reset_is_an_event_of_its_own_and_no_warning(around: Around, bench: Be
     bench.station.reset()
     bench.first.answer(Reset({}, {}, held=False))
     bench.draw(around)
-    (line,) = (line for line in around.events.lines if "stop reset" in line.text)
+    (line,) = (line for line in around.events.lines if "faults cleared" in line.text)
     assert (line.mark.shape, line.mark.colour, line.mark.word) == ("ring", "dim", "RESET")
 
 

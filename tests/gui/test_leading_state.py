@@ -17,6 +17,7 @@ def reset(bench: Bench, state: float, quality: str = "ok") -> None:
     bench.station.take(
         [telemetry([received_ns], columns, received_ns), looked(state=quality, problem="late")]
     )
+    bench.station.stopping.held = True
     bench.station.stopping.was_reset(held=False)
     bench.look_again([looked(state=quality, problem="late")])
 

@@ -38,6 +38,7 @@ class Alarm:
     node: str = ""  # the bus of what is a node
     under: "tuple[Alarm, ...]" = ()  # what it explains
     aside: str = ""  # said only where there is room for all
+    word: str = ""  # another one than its kind's, of the same meaning
     grade: int = 0  # its code, or how bad it is: where that is another, or worse, it is to be read again
     why: str = ""  # more of the cause, below the line: what is to be done stands in it
 
@@ -52,7 +53,10 @@ class Alarm:
 
         Parts that are lost are counted in it: `computer halted, 6 lost`.
         """
-        own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
+        own = TEXTS[self.kind].mark
+        if self.word:
+            return dataclasses.replace(own, word=self.word)
+        worst = min((self, *self.under), key=lambda one: _RANK[one.kind])
         shown = TEXTS[worst.kind].mark
         if shown.colour == own.colour:
             return own

@@ -11,6 +11,7 @@ from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.stop import StopProgress, StopState
 
 DRIVES_NOT_KNOWN: Final = "it has told of no drive"
+FAULTS_CLEARED: Final = "faults cleared"
 EVERY_OFF: Final = "every drive is off"
 OFF: Final = frozenset({"switch on disabled"})
 
@@ -39,7 +40,8 @@ def stop_alarms(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
         words = set(state_words(robot).values())
         is_every = is_live(robot) and words and words <= OFF
         what = EVERY_OFF if is_every else drives_did(robot) or DRIVES_NOT_KNOWN
-        yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s)
+        word = FAULTS_CLEARED if stopping.was_fault else ""
+        yield Alarm(Kind.RESET, "", what, check=go_on(Kind.RESET, robot), since_s=stopping.since_s, word=word)
 
 
 def go_on(kind: Kind, robot: Robot) -> str:

@@ -261,7 +261,7 @@ class Playback:
             return False
         if self._fed_ns is None:
             self._begin_anew(tape)
-        end_ns = target_ns if target_ns > tape.first_ns else target_ns + FIRST_NS
+        end_ns = 1 + (target_ns if target_ns > tape.first_ns else target_ns + FIRST_NS)  # with the row at it
         if end_ns > begin_ns:
             shown = [self._pieces[place].between(begin_ns, end_ns) for place in wanted]
             self._feed(Rows.joined([piece.rows for piece in shown]))

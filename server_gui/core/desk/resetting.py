@@ -49,14 +49,15 @@ class Resetting:
             self._tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
             return
         self._stopping.was_reset(reset.held)
-        said, stays = after_reset(reset, go_on(Kind.RESET, self._robot))
+        next_step = go_on(Kind.RESET, self._robot)
+        said, stays = after_reset(reset, next_step, of_faults=self._stopping.was_fault)
         self._tell(NewsKind.STOP if reset.held or stays else NewsKind.RESET, said)
         if stays:
             self._tell(NewsKind.FAULT, stays)
             failed(stays)
 
 
-def after_reset(reset: Reset, next_step: str) -> tuple[str, str]:
+def after_reset(reset: Reset, next_step: str, *, of_faults: bool = False) -> tuple[str, str]:
     """Return what became of the stop, and the next step where that is over.
 
     And of drives that have not left fault, with why and what to do, else "".
@@ -70,7 +71,8 @@ def after_reset(reset: Reset, next_step: str) -> tuple[str, str]:
         return "; ".join(
             filter(None, ["no stop is held, but not every fault is cleared", _told(others)])
         ), in_fault
-    done = "; ".join(filter(None, ["stop reset, every drive is off", _told(others)]))
+    ended = "faults cleared" if of_faults else "stop reset"
+    done = "; ".join(filter(None, [f"{ended}, every drive is off", _told(others)]))
     return f"{done}; {next_step}", ""
 
 

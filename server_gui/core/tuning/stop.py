@@ -94,6 +94,7 @@ class StopProgress:
     reason: str = ""  # of the one that is held
     problem: str = ""  # why that will not outlive the robot's gateway
     was_ended: bool = False  # by a reset, since when nothing was enabled
+    was_fault: bool = False  # that reset had no stop to end: it has cleared faults
     at_ns: int | None = None
     since_s: float | None = None  # UTC: of this state, as far as is known
     answered_ms: float | None = None
@@ -195,8 +196,9 @@ class StopProgress:
 
     def was_reset(self, held: bool, at_s: float | None = None) -> None:
         """Take the result of a reset, and its UTC (default: now)."""
-        self.held = held
+        was_held, self.held = self.held or self.state is not StopState.IDLE, held
         if not held:
+            self.was_fault = not was_held and (self.was_fault or not self.was_ended)
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
             self.silent, self._confirmed = (), frozenset()  # they say nothing of the next one
             self.is_outdated, self.problem = False, ""

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from gateway.client import ConnectionState
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
-from gateway.wire.stop import StopInfo, Stopped
+from gateway.wire.stop import Reset, StopInfo, Stopped
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.drive_states import moving_joints
 from server_gui.core.alarms.robot_alarms import UNLOOKED_S
@@ -156,3 +156,21 @@ def test_a_code_that_is_not_known_for_a_row_makes_no_alarm_unread(bench: Bench) 
             station.acknowledge(the(bench, Kind.FAULT).alarm)
         reads.append(the(bench, Kind.FAULT).is_acknowledged)
     assert reads == [True] * 4
+
+
+def test_a_reset_without_a_stop_has_cleared_faults_and_says_how_to_go_on(bench: Bench) -> None:
+    """Nobody had pressed STOP, and it was called a stop that was reset."""
+    station = bench.station
+    station.take([row(6.0, left_knee__state=7.0)])
+    for _ in range(2):
+        station.reset()
+        bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+        station.take([row(6.0)])
+        assert the(bench, Kind.RESET).alarm.line.startswith("faults cleared: every drive is off")
+        assert "enable the drives" in the(bench, Kind.RESET).alarm.check
+        assert bench.desk.news.items[0].text.startswith("faults cleared, every drive is off")
+    station.stop("test")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    station.reset()
+    bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    assert the(bench, Kind.RESET).alarm.mark.word == "stop reset"

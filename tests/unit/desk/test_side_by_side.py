@@ -234,7 +234,7 @@ def test_before_its_beginning_the_second_has_no_row_and_then_its_first(steps: Be
     assert station.robot.description is not None, "its channels can be chosen"
     steps.jump(4.0)
     assert isinstance(station.robot, PlayedRobot)
-    assert station.robot.row_ns == steps.second.first_ns + SECOND_NS - SECOND_NS // 10
+    assert station.robot.row_ns == steps.second.first_ns + SECOND_NS, "the row at it is shown"
 
 
 def test_a_heel_strike_is_of_the_utc_of_its_own_row(monkeypatch: pytest.MonkeyPatch) -> None:
