@@ -127,11 +127,13 @@ def _told(answer: dict[str, Any]) -> str:
         return f"begun: {_active(answer['begun'])}\n"
     for key in ("cleared", "active"):
         if key in answer:
-            lines = [_active(one) for one in answer[key]] or [
-                f"nothing was {key}" if key == "cleared" else "nothing is on"
-            ]
-            return "".join(f"{line}\n" for line in lines)
+            told, none = (_cleared, "nothing was cleared") if key == "cleared" else (_active, "nothing is on")
+            return "".join(f"{line}\n" for line in map(told, answer[key])) or f"{none}\n"
     return "".join(f"{key}: {value}\n" for key, value in answer.items())
+
+
+def _cleared(one: dict[str, Any]) -> str:
+    return f"cleared: {one['name']} on {one['on']}"
 
 
 def _active(one: dict[str, Any]) -> str:

@@ -72,6 +72,8 @@ class Question(QDialog):
     def add(self, field: QLineEdit) -> None:
         """Add another field, above the buttons; it needs room, which is looked for again."""
         self._column.insertWidget(self._column.count() - 1, field)
+        field.show()  # what is not shown yet gets no room
+        field.ensurePolished()
         QWidget.setTabOrder(self.field or self.words, field)
         self.keep_in_sight(self._over, ())
 

@@ -186,6 +186,8 @@ def test_a_question_with_two_fields_has_room_for_all_of_its_words(
     needed = question.words.heightForWidth(question.words.width())
     assert question.words.height() >= needed
     assert question.act.geometry().bottom() < question.height()
+    foot = window.mapToGlobal(window.rect().bottomLeft()).y()
+    assert question.mapToGlobal(question.rect().bottomLeft()).y() <= foot, "its buttons are below the edge"
 
 
 def test_a_card_about_a_fault_stays_while_nobody_knows_its_drive(window: MainWindow, bench: Bench) -> None:

@@ -389,12 +389,19 @@ def test_what_comes_while_it_is_stopped_is_not_kept_and_a_name_begins_a_session(
         assert (link.notes, link.wearer, recording.wearer) == ("stairs", "P02", "P02")
         again_ns = station.rings.newest_ns or 0
         wait(lambda: (station.rings.newest_ns or 0) > again_ns + 5 * 10**8, "recorded again")
+        recording.pause()
+        wait(lambda: recording.is_paused, "stopped")
+        recording.go_on("")
+        wait(lambda: not recording.is_paused, "went on")
+        link = recording.link(station.address)
+        assert link is not None
+        assert (link.notes, link.wearer) == ("", "P02"), "without a name it has no other's"
     store = Store(settings.store.url)
     sessions = store.dataset("sessions").to_table().to_pylist()
     notes = {row["session"]: row["notes"] for row in sessions}
-    assert sorted(notes.values()) == ["first", "stairs"]
+    assert sorted(notes.values()) == ["", "first", "stairs"]
     worn = {(row["notes"], row["wearer"], row["consent"]) for row in sessions}
-    assert worn == {("first", "P01", "signed"), ("stairs", "P02", "")}, (
+    assert worn == {("first", "P01", "signed"), ("stairs", "P02", ""), ("", "P02", "")}, (
         "what another has agreed to is not hers"
     )
     stamps_ns = store.dataset(TELEMETRY.location("exo-01", 1)).to_table(["stamp_ns"])["stamp_ns"].to_pylist()

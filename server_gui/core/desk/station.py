@@ -26,7 +26,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.alarms.watch import AlarmWatch
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
-from server_gui.core.desk.beyond_news import BeyondNews
+from server_gui.core.desk.alarm_news import AlarmNews
 from server_gui.core.desk.flag_watch import FlagWatch, of_stop
 from server_gui.core.desk.flags import Flag, FlagKind, Flags
 from server_gui.core.desk.resetting import Resetting
@@ -114,7 +114,7 @@ class Station:
         self._news = RobotNews(self.tell)
         self._watched_ns = 0
         self._happened = FlagWatch()
-        self._beyond_news = BeyondNews(self.tell)
+        self._alarm_news = AlarmNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
         self._resetting = Resetting(commands, deliver, self.robot, self.stopping, self.tell)
@@ -241,7 +241,7 @@ class Station:
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._news.look(self.robot)
-            self._beyond_news.look(self.alarms.active)  # looked for now, so that it is known since when
+            self._alarm_news.look(self.alarms.active)  # looked for now, so that it is known since when
             self.reverted.look_if_over(now_ns)
             self._others.own(*(() if self.experiment is None else self.experiment.writes))
             self._others.look(now_ns)

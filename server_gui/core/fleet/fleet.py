@@ -135,11 +135,11 @@ class Fleet:
             member.keeping.pause()
 
     def go_on(self, name: str, wearer: str | None = None) -> None:
-        """Record all of them again, in sessions with this name; without one as they were called.
+        """Record all of them again, in sessions with this name, or without one.
 
         They are of this wearer, None: of the same as before. What another has agreed to is not known.
         """
-        self._notes, self.is_paused = name or self._notes, False
+        self._notes, self.is_paused = name, False
         if wearer is not None and wearer != self._worn.wearer:
             self._worn = Worn(wearer)
         for member in self._members.values():

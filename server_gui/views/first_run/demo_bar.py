@@ -160,12 +160,14 @@ class DemoBar(QToolBar):
             return f"Not done: {self._failed}"
         broken = ", ".join(f"{words(one.name)} on {words(one.on)}" for one in self._listed.active)
         tripped = ", ".join(map(words, self._tripped()))
-        said = f"Broken: {broken}" if broken else "Simulated robot; nothing was broken here"
+        of_several = len(self._station.neighbours) > 1
+        robot = f"Simulated robot, {self._station.title}" if of_several else "Simulated robot"
+        said = f"Broken: {broken}" if broken else f"{robot}; nothing was broken here"
         if tripped:
             clear = f"Clear fault{ENDS if held else ''}"
             how = f"{REPAIR}, then {clear}" if broken else clear
-            return f"{said if broken else 'Simulated robot'}. Tripped: {tripped}. {how}, then Start walking"
-        whose = f"A stop of {self._station.title} is held" if len(self._station.neighbours) > 1 else ""
+            return f"{said if broken else robot}. Tripped: {tripped}. {how}, then Start walking"
+        whose = f"A stop of {self._station.title} is held" if of_several else ""
         whose = whose or "A stop is held"
         return f"{said}. {whose}: reset it, then Start walking" if held else said
 

@@ -100,6 +100,7 @@ def ask_name(parent: QWidget, begin: Callable[[str, str], None], worn_by: str = 
     )
     if question.field is name:  # else it is asked already
         question.add(wearer)
+        wearer.selectAll()  # who types another one does not add to the last
 
 
 def _words(recording: Recording, said: Said, address: str | None) -> Words:

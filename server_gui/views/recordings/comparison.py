@@ -32,6 +32,7 @@ MOVED: Final = ("Metric", "Word", "Before", "After", "Difference", "95 % interva
 DIFFERENT: Final = (Word.WORSE, Word.BETTER, Word.CHANGED)
 TONES: Final = {Word.WORSE: "bad", Word.BETTER: "good"}
 NOT_THE_CAUSE: Final = (
+    "Differences are without a slow drift and at equal speed, so they are not just after − before. "
     "This moved at the same time, perhaps for another reason: two recordings differ in more than anybody has "
     "noted. A trial of one change on one day shows what it does."
 )

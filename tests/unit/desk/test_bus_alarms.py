@@ -31,6 +31,16 @@ def test_a_bus_that_is_full_now_is_an_alarm_and_is_over_when_it_is_not(bench: Be
     assert kinds(bench.station) == []
 
 
+def test_a_bus_that_is_full_or_fails_is_an_event_as_it_begins(bench: Bench) -> None:
+    """Of its alarm nothing was left once it was over."""
+    station = bench.station
+    for load in (100.0, 100.0, 20.0):
+        station._watched_ns = 0
+        station.take([BusesSeen((replace(FINE, load_percent=load),), time.monotonic_ns())])
+    told = [item.text for item in bench.desk.news.items if "bus full" in item.text]
+    assert told == [f"{FINE.name}: bus full: 100 % of its time is taken"]
+
+
 def test_the_load_of_a_bus_has_a_beginning_of_its_own(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """It seemed to be as old as the PDOs that had been missing since long before."""
     passive = replace(FINE, state="error passive")

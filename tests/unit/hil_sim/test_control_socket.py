@@ -245,7 +245,9 @@ def test_the_command_begins_shows_and_clears(folder: Path, capsys: pytest.Captur
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("begun: node_lost on left_hip from ")
     assert lines[1].endswith("until it is cleared, percent 30 %, cob_id 0x7F0")
-    assert [line.split()[0] for line in lines[2:6]] == ["node_lost", "bus_load", "node_lost", "bus_load"]
+    assert [line.split()[0] for line in lines[2:4]] == ["node_lost", "bus_load"]
+    assert lines[4:6] == ["cleared: node_lost on left_hip", lines[5]]
+    assert lines[5].startswith("cleared: bus_load on ")
     assert lines[6] == "nothing is on"
 
 
