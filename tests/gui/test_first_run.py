@@ -141,6 +141,10 @@ def test_walking_is_offered_where_it_is_over_and_no_stop_is_held_and_the_simulat
     bench.station.stopping.held = False
     now_ns = time.monotonic_ns()
     off: dict[str, list[float | None]] = {f"{joint}.state": [6.0] for joint in JOINTS}
+    bench.station.take([telemetry([now_ns], off, now_ns), looked(state="lost", problem="no heartbeat")])
+    demo.draw()
+    assert not demo.bar.walk.isEnabled()
+    assert demo.bar.walk.toolTip() == "Silent: left knee. Repair all first"
     bench.station.take([telemetry([now_ns], off, now_ns), looked()])
     demo.draw()
     click(demo.bar.walk)

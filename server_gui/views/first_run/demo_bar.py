@@ -25,6 +25,7 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
 ENDS: Final = " (which also ends the stop that is held)"
+GONE: Final = frozenset({Kind.LOST, Kind.PART_STALE})
 WIDE: Final = 1200  # at text of 100 %: the tour has room beside the buttons
 REPAIR: Final = "Repair all"
 WALKING: Final = "It walks, with every drive enabled"
@@ -99,7 +100,13 @@ class DemoBar(QToolBar):
         if self._station.stopping.state in (StopState.SENT, StopState.NOT_CONFIRMED):
             return "A STOP is not confirmed yet"
         tripped = self._tripped()
-        return f"In fault: {', '.join(map(words, tripped))}. Clear the fault first" if tripped else ""
+        if tripped:
+            return f"In fault: {', '.join(map(words, tripped))}. Clear the fault first"
+        joints = self._station.robot.names("joint")
+        gone = [
+            one.subject for one in self._station.alarms.each if one.kind in GONE and one.subject in joints
+        ]
+        return f"Silent: {', '.join(map(words, gone))}. {REPAIR} first" if gone else ""
 
     def _build(self) -> None:
         self.walk.clicked.connect(lambda: self._ask(self._control.walk))
