@@ -168,6 +168,8 @@ def test_stop_all_is_whole_beside_the_pages_where_the_list_of_robots_is_narrow(
     window.resize(1366, 768)
     for place in range(2, 5):
         bench.add(f"exo-0{place}", 7420 + place).take([described(f"exo-0{place}"), walking(20), looked()])
+    for _ in range(3):
+        settle(window, bench)  # with each width of the window panels have their sizes again
     for wide, is_cut in ((60, True), (250, False)):
         window.resizeDocks(window.docks[:1], [wide], Qt.Orientation.Horizontal)
         for _ in range(3):
