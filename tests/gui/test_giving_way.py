@@ -10,7 +10,7 @@ from server_gui.core.tuning.writing import WriteState
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench
-from tests.support.desk import looked
+from tests.support.desk import described, looked
 
 PARAMETERS = 1  # among the docks
 
@@ -112,6 +112,21 @@ def test_it_is_no_arrangement_of_anybody(wide: MainWindow, bench: Bench, theme: 
     assert parameters in wide.tabifiedDockWidgets(wide.docks[0])
     theme.set(scale=1.0)
     bench.draw(wide)
+    wide.tabs.look_at(wide.tabs.overview)
+    bench.draw(wide)
+    assert all(dock.isVisible() for dock in wide.docks)
+
+
+def test_what_had_given_way_as_the_last_robot_went_comes_back_with_another(
+    wide: MainWindow, bench: Bench
+) -> None:
+    wide.tabs.look_at_recordings()
+    bench.draw(wide)
+    bench.desk.remove(bench.station)
+    bench.draw(wide)
+    bench.add("exo-02", 7421).take([described("exo-02"), looked()])
+    bench.draw(wide)
+    assert not wide.docks[PARAMETERS].isVisible(), "the page has its room still"
     wide.tabs.look_at(wide.tabs.overview)
     bench.draw(wide)
     assert all(dock.isVisible() for dock in wide.docks)
