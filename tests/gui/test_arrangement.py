@@ -51,6 +51,26 @@ def test_a_window_that_was_narrow_for_a_while_gives_them_their_widths_back(
     assert widths(arranged) == MINE, "nor is what is kept over the end of the program squeezed"
 
 
+def test_another_start_has_the_widths_of_before(theme: Theme, tmp_path: Path) -> None:
+    file = str(tmp_path / "kept.ini")
+    for start in range(3):
+        desk = Bench(Desk())
+        desk.add("exo-01").take([described(), walking(20), looked()])
+        window = MainWindow(desk.desk, theme, QSettings(file, QSettings.Format.IniFormat))
+        window.resize(1600, 900)
+        window.show()
+        for _ in range(3):
+            desk.draw(window)
+        if not start:
+            window.resizeDocks(window.docks[:2], MINE, Qt.Orientation.Horizontal)
+            for _ in range(2):
+                desk.draw(window)
+        assert widths(window) == MINE
+        window.close()
+        window.kept.sync()
+        destroy(window)
+
+
 @pytest.mark.parametrize("least", [1200, 1280, 980])
 def test_so_does_one_that_is_dragged_narrow_and_wide(arranged: MainWindow, bench: Bench, least: int) -> None:
     """Frames are drawn meanwhile: each would take what is squeezed for what somebody wants."""

@@ -59,6 +59,7 @@ class Docks(QObject):
         self._sizes: dict[QDockWidget, QSize] = {}  # as people have made them
         self._given: dict[QDockWidget, QSize] | None = None  # what they have since the window has this width
         self._given_width = 0
+        self._is_restored = False
         self._seen: list[QDockWidget] = []  # that are shown where all have room, or have given way
         self._is_held, self._held = False, list[QDockWidget]()
         self._gave_way: list[QDockWidget] = []
@@ -75,18 +76,23 @@ class Docks(QObject):
         return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
 
     def restore(self, state: QByteArray) -> None:
-        """Arrange them as it was kept; as they were at first where Qt cannot."""
+        """Arrange them as it was kept, with their sizes; as they were at first where Qt cannot."""
+        self._is_restored = self._restore(state)
+
+    def _restore(self, state: QByteArray) -> bool:
         # Qt makes new bars of tabs, and draws the old ones over the pages until it deletes them later.
         for bar in self._window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
             bar.hide()
-        if not self._window.restoreState(state, LAYOUT):
-            self._window.restoreState(self._usual, LAYOUT)
+        if self._window.restoreState(state, LAYOUT):
+            return True
+        self._window.restoreState(self._usual, LAYOUT)
+        return False
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
         self._gave_way, self._sizes, self._given = [], {}, None
         self._roomy = self._usual
-        self.restore(self._usual)
+        self._restore(self._usual)
         for dock in shown:
             dock.show()
         if self.is_narrow:
@@ -107,6 +113,8 @@ class Docks(QObject):
         sizes = {dock: dock.size() for dock in self._in_sight}
         if self._window.width() != self._given_width:
             self._given_width, self._given = self._window.width(), None
+            if self._is_restored:
+                self._sizes, self._is_restored = sizes, False
             self._size()
             return
         before = self._given or sizes
@@ -192,6 +200,7 @@ class Docks(QObject):
 
     def fit(self, *, scaled: bool = False) -> None:
         """Arrange them for the room that there is; where text has another size, as wide as it needs."""
+        scaled = scaled and not self._is_restored  # whose sizes are for this text
         if scaled:
             self._sizes = {}
         was_held = self._is_held
@@ -206,7 +215,8 @@ class Docks(QObject):
             self.hold_back(is_held=was_held)
         if not self._is_held:
             self._fit_tight()
-        if scaled or (self._usual_widths != self._widths and not self.is_narrow):
+        is_other = self._usual_widths != self._widths and not self.is_narrow and not self._is_restored
+        if scaled or is_other:
             self._size()
 
     def _fit_tight(self) -> None:
@@ -304,7 +314,7 @@ class Docks(QObject):
     def _unstack(self) -> None:
         for dock in self.all:
             self._give_title(dock)
-        self.restore(self._roomy)
+        self._restore(self._roomy)
         for dock in self._seen and self.all:
             dock.setVisible(dock in self._seen)
         self._size()
