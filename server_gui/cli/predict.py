@@ -142,7 +142,10 @@ class _Linked:
 
     def __call__(self, live: Live) -> None:
         for name, watched in live.robots.items():
-            told_now = "connected" if watched.robot.link.state is ConnectionState.CONNECTED else link(watched)
+            state = watched.robot.link.state
+            if state is ConnectionState.CONNECTING and name in self._said:
+                continue  # it tries again, which ends in another word or in the same
+            told_now = "connected" if state is ConnectionState.CONNECTED else link(watched)
             if self._said.get(name) != told_now:
                 self._said[name] = told_now
                 warn("predict", f"{name}: {told_now}")

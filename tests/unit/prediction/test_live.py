@@ -4,12 +4,15 @@ import json
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from msgspec.structs import replace
 
-from gateway.client import Address
+from gateway.client import Address, ConnectionState
 from server_gui.cli import predict
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.follow.robot import Robot
 from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Predicted, PredictionNews
 from server_gui.core.settings.prediction import Action, RuleSettings
@@ -69,6 +72,19 @@ def test_a_robot_that_is_not_there_is_said_and_no_success(
     assert not [line for line in said.out.splitlines() if "label" in json.loads(line)]
     assert said.err.count("exo-01: waiting: no gateway at") == 2
     assert said.err.count("nothing was predicted") == 2
+
+
+def test_a_robot_that_stays_away_is_said_once_however_often_it_is_tried(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    watched = SimpleNamespace(robot=Robot())
+    said = predict._Linked()
+    states = (ConnectionState.CONNECTING, ConnectionState.WAITING) * 3
+    for state in (*states, ConnectionState.CONNECTED, *states):
+        watched.robot.apply(LinkChanged(state, "no gateway" if state is ConnectionState.WAITING else None, 1))
+        said(SimpleNamespace(robots={"exo-01": watched}))  # type: ignore[arg-type]
+    told = [line.partition("exo-01: ")[2].partition(":")[0] for line in capsys.readouterr().err.splitlines()]
+    assert told == ["connecting", "waiting", "connected", "waiting"]
 
 
 @pytest.mark.parametrize(
