@@ -283,6 +283,7 @@ def test_a_stop_that_cannot_be_followed_is_not_confirmed_and_the_others_are_foll
 ) -> None:
     """Nothing was shown of any, and the robot's STOP of before stood as this one's."""
     first, second = two.desk.stations
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)  # however busy it is here
     confirmed(two)
     seen(second, 4.0)
     monkeypatch.setattr(first, "note_stop", fails)
