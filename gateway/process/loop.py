@@ -131,7 +131,8 @@ class Loop:
             self._turn()
 
     def close(self) -> None:
-        """Give the descriptors back."""
+        """Give the descriptors back; what is posted later wakes nobody, as they may be others' by then."""
+        self._woken = True
         self._poll.close()
         os.close(self._wake_reader)
         os.close(self.wake_writer)
