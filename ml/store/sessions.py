@@ -19,6 +19,7 @@ from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
 
+OBJECT: Final = "object/"  # begins the keys of a session's set-up that tell each parameter's object and unit
 ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
 SHORTEST_NS: Final = 1_000_000_000  # that is read at once
 KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
@@ -30,9 +31,6 @@ UNREAD: Final = "the rest of it is in the store, which is not reached"  # where 
 _UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
 _WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time
-
-
-OBJECT: Final = "object/"  # begins the keys of a session's set-up that tell each parameter's object and unit
 
 
 class SessionPiece(NamedTuple):

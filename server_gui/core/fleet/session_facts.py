@@ -14,6 +14,7 @@ from gateway.wire.framing import PROTOCOL
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.resource import KernelFacts
 from gateway.wire.robot import Description
+from ml.store.sessions import OBJECT
 from server_gui.core.recording.records import NOBODY, RECORDER, Facts, Worn
 
 ENABLED: Final = "operation enabled"  # the word of a drive's state in which it follows its target
@@ -69,7 +70,7 @@ def setup(description: Description) -> dict[str, str | float]:
         if part.calibration is not UNSET:
             found[f"calibration/{part.name}"] = part.calibration or NO_FILE
     for known in description.parameters:
-        found[f"object/{known.name}"] = f"{known.object} {known.unit}".rstrip()
+        found[f"{OBJECT}{known.name}"] = f"{known.object} {known.unit}".rstrip()
         if known.read_only is None:
             found[f"limits/{known.name}"] = _limits(known)
     for rule in description.guard.rules:

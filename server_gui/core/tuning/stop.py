@@ -238,7 +238,8 @@ class StopProgress:
             self._entry = 0  # another journal
         is_open = self.state is StopState.NOT_CONFIRMED and not self.held
         was_ended, is_history, is_older = self.was_ended, self._entry == 0, False
-        is_lost, held = False, (self.reason, self.problem)  # the stop that is held was in no journal
+        is_lost, is_told = False, is_history and self.held and self._told_s is not None
+        reason, problem = self.reason, self.problem
         for number, entry in told:
             if number <= self._entry:
                 continue
@@ -254,8 +255,10 @@ class StopProgress:
                 self.held, self.reason, is_older = True, _said(entry), True
             elif is_older and _is_reset(entry):
                 self.held, self.reason, is_older = False, "", False
-        if is_lost and not self.held:
-            self.held, (self.reason, self.problem), self.since_s, self._stood_s = True, held, None, None
+        if is_lost and not self.held:  # the stop that is held was in no journal
+            self.held, self.reason, self.since_s, self._stood_s = True, reason, None, None
+        if is_told and self.held:
+            self.problem = problem  # as the robot has said of it: what was before says nothing of that
         self._reads += 1
         if is_history and not was_ended:
             self.was_ended = False  # nobody knows what was enabled since

@@ -60,7 +60,7 @@ class WriteProgress:
     trial: Trial | None = None
     failed_ask: str = ""  # what of a trial was asked for and not done: to keep it, or take it back
     why_failed: str = ""
-    asks: int = 0
+    asks: int = 0  # of that kind, so far
     undo: collections.deque[Mapping[str, Number]] = field(
         default_factory=lambda: collections.deque(maxlen=UNDO)
     )
@@ -93,7 +93,7 @@ class WriteProgress:
             self._set(WriteState.DONE, f"{_count(len(written.after))} written and read back")
         else:
             until_ns = time.monotonic_ns() + round(written.trial_s * 1e9)
-            self.asked()
+            self.failed_ask = self.why_failed = ""
             self.trial = Trial(written.write, written.after, written.before, until_ns)
             self._set(WriteState.DONE, "on trial: read back, and in force until it is taken back")
 

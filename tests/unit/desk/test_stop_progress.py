@@ -410,7 +410,7 @@ def test_rows_that_come_late_correct_since_when_it_has_stood() -> None:
 def test_a_stop_that_the_robot_holds_is_as_old_as_its_own_entry_not_as_one_that_was_reset() -> None:
     """With a history of two hours, STOPPED was since the oldest stop in it."""
     stopping = StopProgress()
-    stopping.described(held=True, reason="door")
+    stopping.described(held=True, reason="door", problem="not beyond this gateway")
     now_s = time.time()
     past = [(1, "stop", 7200.0), (2, "reset", 7100.0), (3, "stop", 120.0)]
     stopping.read(
@@ -426,6 +426,7 @@ def test_a_stop_that_the_robot_holds_is_as_old_as_its_own_entry_not_as_one_that_
     )
     assert stopping.held
     assert stopping.since_s == pytest.approx(now_s - 120.0, abs=1.0)
+    assert stopping.problem == "not beyond this gateway", "the resets before are not of it"
 
 
 def test_what_was_wrong_with_a_stop_that_is_over_is_not_said_of_the_next() -> None:
