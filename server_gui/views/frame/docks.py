@@ -78,6 +78,8 @@ class Docks(QObject):
     def restore(self, state: QByteArray) -> None:
         """Arrange them as it was kept, with their sizes; as they were at first where Qt cannot."""
         self._is_restored = self._restore(state)
+        if self._is_restored:
+            self._roomy = state  # also where the window begins narrow
 
     def _restore(self, state: QByteArray) -> bool:
         # Qt makes new bars of tabs, and draws the old ones over the pages until it deletes them later.
@@ -90,7 +92,7 @@ class Docks(QObject):
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
-        self._gave_way, self._sizes, self._given = [], {}, None
+        self._gave_way, self._sizes, self._given_width, self._is_restored = [], {}, 0, False
         self._roomy = self._usual
         self._restore(self._usual)
         for dock in shown:
@@ -124,7 +126,7 @@ class Docks(QObject):
             if self._wide_or_high(dock, size) != self._wide_or_high(dock, before.get(dock, size))
         }
         self._given = sizes
-        self._seen = [*self._in_sight, *self._gave_way]
+        self._seen = [dock for dock in self.all if not dock.isHidden() or dock in self._gave_way]
         if not self._gave_way:
             self._roomy = self._window.saveState(LAYOUT)
 
@@ -315,9 +317,11 @@ class Docks(QObject):
         for dock in self.all:
             self._give_title(dock)
         self._restore(self._roomy)
-        for dock in self._seen and self.all:
-            dock.setVisible(dock in self._seen)
-        self._size()
+        if self._seen:
+            for dock in self.all:
+                dock.setVisible(dock in self._seen)
+        if not self._is_restored:
+            self._size()
         self._given_width = 0  # and with the next frame, which knows how wide the window is
 
     def _give_title(self, dock: QDockWidget, bar: QWidget | None = None) -> None:
