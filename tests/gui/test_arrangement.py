@@ -51,21 +51,33 @@ def test_a_window_that_was_narrow_for_a_while_gives_them_their_widths_back(
     assert widths(arranged) == MINE, "nor is what is kept over the end of the program squeezed"
 
 
-def test_another_start_has_the_widths_of_before(theme: Theme, tmp_path: Path) -> None:
+def test_another_start_has_the_arrangement_of_before_also_after_one_in_a_narrow_window(
+    theme: Theme, tmp_path: Path
+) -> None:
     file = str(tmp_path / "kept.ini")
-    for start in range(3):
+    for wide in (1600, 1600, 1000, 1600, 1000):
         desk = Bench(Desk())
         desk.add("exo-01").take([described(), walking(20), looked()])
-        window = MainWindow(desk.desk, theme, QSettings(file, QSettings.Format.IniFormat))
-        window.resize(1600, 900)
+        kept = QSettings(file, QSettings.Format.IniFormat)
+        is_first = not kept.contains("state")
+        window = MainWindow(desk.desk, theme, kept)
+        window.resize(wide, 900)
         window.show()
         for _ in range(3):
             desk.draw(window)
-        if not start:
+        if is_first:
+            window.docks[2].hide()
             window.resizeDocks(window.docks[:2], MINE, Qt.Orientation.Horizontal)
             for _ in range(2):
                 desk.draw(window)
+        if wide == 1000:
+            window.resize(1600, 900)
+            for _ in range(2):
+                desk.draw(window)
         assert widths(window) == MINE
+        assert not window.docks[2].isVisible()
+        window.resize(wide, 900)
+        desk.draw(window)
         window.close()
         window.kept.sync()
         destroy(window)
@@ -129,6 +141,19 @@ def test_so_does_one_whose_last_robot_went_for_a_while(arranged: MainWindow, ben
     bench.add("exo-01")
     bench.draw(arranged)
     assert widths(arranged) == MINE
+
+
+def test_a_panel_that_floats_goes_on_to_while_the_window_is_narrow(
+    arranged: MainWindow, bench: Bench
+) -> None:
+    floating = arranged.docks[1]
+    floating.setFloating(True)
+    bench.draw(arranged)
+    for width in (1000, 1600):
+        arranged.resize(width, 900)
+        for _ in range(2):
+            bench.draw(arranged)
+        assert (floating.isVisible(), floating.isFloating()) == (True, True)
 
 
 @pytest.mark.parametrize("way", ["text", "window"])
