@@ -3,21 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, QSize, Qt
+from PySide6.QtCore import QByteArray, QEvent, QObject, QPoint, QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QTabWidget, QWidget
 
+from server_gui.views.frame.dock_sizes import DockSizes
 from server_gui.views.frame.dock_title import DockTitle, HasTools
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.visibility import let_go
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
-# Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
-# with range and default.
-WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 492)), (0, (225, 400)))
 ROOMY: Final = 1200  # wide, at text of 100 %: what is narrower has no room for everything at once
-BELOW: Final = (120, 86)  # high, likewise: events, where the window is `HIGH` and where it is not
-HIGH: Final = 820
 TIGHT: Final = 800  # wide, likewise: what is narrower begins without panels, which would hide the robot
 STACK: Final = 356  # wide, likewise: panels that are one behind the other
 BUTTONS: Final = 80  # wide, likewise: what stands beside a panel's title
@@ -47,7 +43,6 @@ class Docks(QObject):
         self._uncovered = uncovered
         self._theme = theme
         self.is_narrow = self._is_tight = False
-        self._widths: tuple[int, int] | None = None
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
         window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
@@ -56,14 +51,11 @@ class Docks(QObject):
         self.all[-1].hide()
         self._put_away: list[QDockWidget] = []
         self._is_put_away_for_room = False
-        self._sizes: dict[QDockWidget, QSize] = {}  # as people have made them
-        self._given: dict[QDockWidget, QSize] | None = None  # what they have since the window has this width
-        self._given_width = 0
-        self._is_restored = False
         self._seen: list[QDockWidget] = []  # that are shown where all have room, or have given way
         self._is_held, self._held = False, list[QDockWidget]()
         self._gave_way: list[QDockWidget] = []
-        self._size()
+        self._sizes = DockSizes(window, theme, self.all)
+        self._sizes.give()
         self._usual = self._roomy = window.saveState(LAYOUT)
         for one in {window, *(around for part in uncovered for around in _within(part, window))}:
             one.installEventFilter(self)
@@ -77,9 +69,9 @@ class Docks(QObject):
 
     def restore(self, state: QByteArray) -> None:
         """Arrange them as it was kept, with their sizes; as they were at first where Qt cannot."""
-        self._is_restored = self._restore(state)
-        if self._is_restored:
+        if self._restore(state):
             self._roomy = state  # also where the window begins narrow
+            self._sizes.restored()
 
     def _restore(self, state: QByteArray) -> bool:
         # Qt makes new bars of tabs, and draws the old ones over the pages until it deletes them later.
@@ -92,7 +84,8 @@ class Docks(QObject):
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
-        self._gave_way, self._sizes, self._given_width, self._is_restored = [], {}, 0, False
+        self._gave_way = []
+        self._sizes.forget()
         self._roomy = self._usual
         self._restore(self._usual)
         for dock in shown:
@@ -101,41 +94,13 @@ class Docks(QObject):
             self._stack()
 
     def settle(self) -> None:
-        """Keep how people have arranged them, where they have room; called once a frame.
-
-        As the window is made narrow Qt squeezes them. That is not what people have arranged: with each width
-        of the window they have their sizes again, and what is other than that later was moved by somebody.
-        """
-        if not self.is_narrow and self.has_room and not self._is_held and self._window.isVisible():
-            self._keep()
+        """Keep how people have arranged them, where they have room; called once a frame."""
+        is_roomy = not self.is_narrow and self.has_room and self._window.isVisible()
+        if is_roomy and not self._is_held and self._sizes.take(self._in_sight):
+            self._seen = [dock for dock in self.all if not dock.isHidden() or dock in self._gave_way]
+            self._roomy = self._roomy if self._gave_way else self._window.saveState(LAYOUT)
         for bar in self._window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
             bar.setFocusPolicy(Qt.FocusPolicy.TabFocus if bar.count() else Qt.FocusPolicy.NoFocus)
-
-    def _keep(self) -> None:
-        sizes = {dock: dock.size() for dock in self._in_sight}
-        if self._window.width() != self._given_width:
-            self._given_width, self._given = self._window.width(), None
-            if self._is_restored:
-                self._sizes, self._is_restored = sizes, False
-            self._size()
-            return
-        before = self._given or sizes
-        self._sizes |= {
-            dock: size
-            for dock, size in sizes.items()
-            if self._wide_or_high(dock, size) != self._wide_or_high(dock, before.get(dock, size))
-        }
-        self._given = sizes
-        self._seen = [dock for dock in self.all if not dock.isHidden() or dock in self._gave_way]
-        if not self._gave_way:
-            self._roomy = self._window.saveState(LAYOUT)
-
-    def _wide_or_high(self, dock: QDockWidget, size: QSize) -> int:
-        """Return the one of both that people choose: what is beside the pages is as high as these."""
-        return size.width() if self._is_beside(dock) else size.height()
-
-    def _is_beside(self, dock: QDockWidget) -> bool:
-        return bool(self._window.dockWidgetArea(dock) & (Area.LeftDockWidgetArea | Area.RightDockWidgetArea))
 
     def put_away(self) -> None:
         """Leave all the room to the tabs; or, where that is so, show what was there again."""
@@ -174,7 +139,8 @@ class Docks(QObject):
             dock.setVisible(not is_held)
         if not is_held:
             self._held = []
-            self._size()
+            if not self.is_narrow:
+                self._sizes.give()
         return not is_held
 
     def bring(self, dock: QDockWidget) -> None:
@@ -202,9 +168,6 @@ class Docks(QObject):
 
     def fit(self, *, scaled: bool = False) -> None:
         """Arrange them for the room that there is; where text has another size, as wide as it needs."""
-        scaled = scaled and not self._is_restored  # whose sizes are for this text
-        if scaled:
-            self._sizes = {}
         was_held = self._is_held
         if self.has_room is self.is_narrow:
             self.hold_back(is_held=False)
@@ -217,9 +180,12 @@ class Docks(QObject):
             self.hold_back(is_held=was_held)
         if not self._is_held:
             self._fit_tight()
-        is_other = self._usual_widths != self._widths and not self.is_narrow and not self._is_restored
-        if scaled or is_other:
-            self._size()
+        if scaled:
+            self._sizes.scale()
+        if not self.is_narrow:
+            self._sizes.give_other()
+        elif scaled:
+            self._stand()
 
     def _fit_tight(self) -> None:
         """Put them away where they would leave too little room to the tabs, until there is more again."""
@@ -276,25 +242,6 @@ class Docks(QObject):
         ]  # never above: its title could be off the screen
         dock.move(frame.x(), min(free, key=lambda y: (y > lowest, abs(y - frame.y()))))
 
-    def _size(self) -> None:
-        """As wide and high as people have made them; the others as usual."""
-        px = self._theme.px
-        if self.is_narrow:
-            self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
-            return
-        self._widths = self._usual_widths
-        high = BELOW[0] if self._window.height() >= px(HIGH) else BELOW[1]
-        usual = dict(zip(self.all, (*map(px, self._widths), px(high)), strict=False))
-        sizes = usual | {dock: self._wide_or_high(dock, size) for dock, size in self._sizes.items()}
-        for way, is_beside in ((Qt.Orientation.Horizontal, True), (Qt.Orientation.Vertical, False)):
-            docks = [dock for dock in sizes if self._is_beside(dock) is is_beside]
-            self._window.resizeDocks(docks, [sizes[dock] for dock in docks], way)
-
-    @property
-    def _usual_widths(self) -> tuple[int, int]:
-        width = self._window.width()
-        return next(widths for least, widths in WIDTHS if width >= self._theme.px(least))
-
     def call(self, dock: QDockWidget, name: str) -> None:
         """Call it so in its title bar, where it has one with its name."""
         bar = dock.titleBarWidget()
@@ -311,7 +258,11 @@ class Docks(QObject):
                 if dock is not first:
                     self._window.tabifyDockWidget(first, dock)
         first.raise_()
-        self._size()
+        self._stand()
+
+    def _stand(self) -> None:
+        """As wide as text of this size needs, where they are one behind the other."""
+        self._window.resizeDocks(self.all[:1], [self._theme.px(STACK)], Qt.Orientation.Horizontal)
 
     def _unstack(self) -> None:
         for dock in self.all:
@@ -320,9 +271,8 @@ class Docks(QObject):
         if self._seen:
             for dock in self.all:
                 dock.setVisible(dock in self._seen)
-        if not self._is_restored:
-            self._size()
-        self._given_width = 0  # and with the next frame, which knows how wide the window is
+        self._sizes.give()
+        self._sizes.give_anew()
 
     def _give_title(self, dock: QDockWidget, bar: QWidget | None = None) -> None:
         """Give it this title bar; by default the usual one, with the tools of its panel where it has some."""

@@ -342,11 +342,11 @@ class MainWindow(QMainWindow):
         self.bring(self.docks[1])
         self.parameters.find_parameter()
 
-    def _press(self, button: str) -> None:
+    def _press(self, button: QPushButton) -> None:
         """Press a button of the parameters, and have these in sight with what comes of it."""
         self.bring(self.docks[1])
         self.parameters.refresh()
-        getattr(self.parameters, button).click()
+        button.click()
 
     def _edit_parameter(self, name: str) -> None:
         self._panels.bring(self.docks[1])
@@ -440,7 +440,8 @@ class MainWindow(QMainWindow):
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
         QShortcut(QKeySequence.StandardKey.Find, self, self._find)
         QShortcut(QKeySequence("?"), self, self.keys.turn)
-        for keys, button in (("Ctrl+Return", "review_button"), ("Ctrl+Z", "undo")):
+        panel = self.parameters
+        for keys, button in (("Ctrl+Return", panel.review_button), ("Ctrl+Z", panel.undo)):
             QShortcut(QKeySequence(keys), self, lambda button=button: self._press(button))
         QShortcut(QKeySequence("Ctrl+K"), self, lambda: self._end_trial(keep=True))
         QShortcut(QKeySequence("Ctrl+T"), self, lambda: self._end_trial(keep=False))
