@@ -1,5 +1,6 @@
 """Error codes of EMCY and of 603Fh: CiA 301 classes, CiA 402 and vendors' codes, what to check for each."""
 
+import re
 from collections.abc import Mapping
 from typing import Final
 
@@ -220,6 +221,7 @@ _CHECKS: Final[Mapping[int, str]] = {
     0xF000: "look into the drive's manual for the code",
     0xFF00: "look into the vendor's manual for the code",
 }
+_WRITTEN: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _UNKNOWN: Final = "look into the drive's manual for the code"
 
 
@@ -228,6 +230,12 @@ def error_text(code: int, vendor_id: int | None = None) -> str:
     vendors = _VENDORS.get(vendor_id or 0, {})
     words = vendors.get(code) or _CODES.get(code) or _class_text(code)
     return f"0x{code:04X} {words}"
+
+
+def code_in(text: str) -> int | None:
+    """Return the first code in a text, as `error_text` writes it; None where there is none."""
+    found = _WRITTEN.search(text)
+    return None if found is None else int(found[1], 16)
 
 
 def error_check(code: int) -> str:

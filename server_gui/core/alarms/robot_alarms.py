@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from drivers.error_codes import code_in
 from gateway.client import ConnectionState
 from gateway.plain_text import one_line
 from gateway.wire.robot import GuardRuleInfo
@@ -33,7 +34,6 @@ UNLOOKED_S: Final = 8.0  # without a word of how devices are: several looks have
 NOT_LOOKED: Final = "how its devices are has not come for some seconds: ok is what they were"
 NO_CODE_YET: Final = "its code has not come yet"
 NO_CODE_THEN: Final = "its code is not known at this instant"
-_CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _MISSING: Final = re.compile(r"(?<=heartbeat has been missing for )(?=\d)")  # it is so still, and longer
@@ -164,9 +164,8 @@ def _is_in_fault(robot: Robot, part: FollowedComponent) -> bool:
 def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
     """Return why a drive is in fault, and its code: as the robot says, else by the drive's own code."""
     said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
-    found = _CODE.search(said)
-    if found is not None:
-        return said, int(found[1], 16)
+    if (code := code_in(said)) is not None:
+        return said, code
     told = robot.values.get(f"{part.name}.error_code")
     if told:
         return error_text(int(told)), int(told)
@@ -182,10 +181,10 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
     channel = _channel(robot, part.name, None)
     is_now = not robot.is_stale()
     if part.state == "ok":
-        found = _CODE.search(problem)
-        if problem.startswith("it reports ") and found is not None:
-            check = error_check(int(found[1], 16))
-            what = said_of_missed(int(found[1], 16), _PREFIX.sub("", problem))
+        code = code_in(problem)
+        if problem.startswith("it reports ") and code is not None:
+            check = error_check(code)
+            what = said_of_missed(code, _PREFIX.sub("", problem))
             yield Alarm(
                 Kind.REPORTS,
                 part.name,
@@ -193,7 +192,7 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
                 where,
                 check=check,
                 channel=channel,
-                grade=int(found[1], 16),
+                grade=code,
                 clears=True,
                 is_now=is_now,
             )
@@ -206,8 +205,8 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
     what, advice = split_advice(problem)
-    if problem.startswith("it reports ") and (found := _CODE.search(problem)) is not None:
-        what = said_of_missed(int(found[1], 16), what) if ";" not in what else what
+    if problem.startswith("it reports ") and ";" not in what:
+        what = said_of_missed(code_in(problem), what)
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
     yield Alarm(
         kind,
@@ -231,7 +230,7 @@ def _of_silent(robot: Robot) -> Iterator[Alarm]:
         part.name
         for part in robot.parts.values()
         if (part.kind == "joint" and _is_in_fault(robot, part) and _cause(robot, part)[1] in MISSED_CODES)
-        or ((found := _CODE.search(part.problem or "")) and int(found[1], 16) in MISSED_CODES)
+        or code_in(part.problem or "") in MISSED_CODES
     }
     for name in silent_nodes(robot, reporters, lambda name: _bus(robot, name)):
         check = check_of(Kind.PART_STALE, robot.parts[name].kind)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, cast
 
-from drivers.error_codes import error_text
+from drivers.error_codes import code_in, error_text
 from gateway.units import Unit, Units, with_minus
 from gateway.wire.parameter import ParameterInfo
 from ml.store.labels import utc_ns
@@ -19,7 +19,6 @@ KEPT: Final = 500
 SOON_NS: Final = 1_000_000_000  # after a fault: then its code is of it
 ASKED_FOR: Final = "asked for"  # with no word of by whom
 TAKEN_BACK: Final = "taken back"  # as the robot's journal has it
-CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 WINDOW: Final = re.compile(r"gwrms gui \((.+):\d+\)")
 HERE: Final = frozenset({"127.0.0.1", "[::1]", "::1"})
 JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
@@ -231,8 +230,7 @@ def fault_codes(flags: Iterable[Flag]) -> dict[str, int]:
     codes: dict[str, int] = {}
     for one in flags:
         if one.kind is FlagKind.FAULT:
-            found = CODE.search(one.text)
-            codes |= dict.fromkeys(_names(one.text), 0 if found is None else int(found[1], 16))
+            codes |= dict.fromkeys(_names(one.text), code_in(one.text) or 0)
     return codes
 
 

@@ -1,9 +1,8 @@
 """Turns what a robot's state does into news: links, components, drive states, error codes."""
 
-import re
 from typing import Final, Protocol
 
-from drivers.error_codes import error_text
+from drivers.error_codes import code_in, error_text
 from gateway.client import ConnectionState
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import FollowedComponent, Robot
@@ -17,7 +16,6 @@ class Tell(Protocol):
 
 
 FEW: Final = 2  # drives that are named before their change
-_CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 LINK_WORDS: Final = {
     ConnectionState.CONNECTED: "connected",
     ConnectionState.WAITING: "no link",
@@ -84,6 +82,8 @@ class RobotNews:
             if word is None or word == before:
                 continue
             self._drives[joint] = word
+            if "fault" in (before or "") and "fault" not in word:
+                self._told.pop(joint, None)  # also where a drive keeps its last code
             if before is not None:
                 changed.setdefault((before, word), []).append(joint)
         every, errors = len(robot.names("joint")), self._new_errors(robot)
@@ -123,10 +123,9 @@ class RobotNews:
 
     def _is_told(self, part: FollowedComponent) -> bool:
         """Return whether this fault is an event already, by its code; note that it is one now."""
-        found = _CODE.search(part.problem or "") if part.state == "fault" else None
-        if found is None:
+        code = code_in(part.problem or "") if part.state == "fault" else None
+        if code is None:
             return False
-        code = int(found[1], 16)
         is_told = self._told.get(part.name) == code
         self._told[part.name] = code
         return is_told

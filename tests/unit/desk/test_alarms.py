@@ -290,6 +290,19 @@ def test_a_fault_and_its_error_are_one_event(bench: Bench) -> None:
     assert one.endswith(" (operation enabled → fault)")
 
 
+def test_a_fault_again_is_an_event_where_a_drive_keeps_its_last_code(bench: Bench) -> None:
+    told: list[str] = []
+    news = RobotNews(lambda _kind, text, _about="": told.append(text))
+    code: list[float | None] = [float(0x2310)]
+    bench.station.take([looked(state="fault", problem=f"the drive is in fault: {CAUSE}")])
+    for state in (4.0, 7.0, 6.0, 7.0):
+        columns: dict[str, list[float | None]] = {"left_knee.state": [state], "left_knee.error_code": code}
+        bench.station.take([telemetry([time.monotonic_ns()], columns)])
+        news.look(bench.station.robot)
+    assert [text for text in told if "→ fault" in text] == ["left knee: switch on disabled → fault"]
+    assert len([text for text in told if "0x2310" in text]) == 1
+
+
 @pytest.mark.parametrize("first", ["the drive", "the robot's word"])
 def test_what_the_drive_and_the_robot_say_of_one_fault_is_said_once_each_time_it_comes(
     bench: Bench, first: str
