@@ -5,9 +5,8 @@ import time
 from typing import Final
 
 KEPT: Final = 60  # frames that are averaged
-LEAST: Final = 5  # before which nothing is said of the rate: a window that opens is slow
+LEAST: Final = 5  # before which no rate is known
 SETTLES_S: Final = 4.0  # a window that opens is slow, whatever else this computer does
-PAUSE_S: Final = 5.0  # between two frames is no rate
 SLOW: Final = 8.0  # frames a second, below which this computer is busy, whatever else it does
 FAST: Final = 10.0  # from which it is not any more, so that no words flicker
 
@@ -17,16 +16,13 @@ class FrameRate:
 
     def __init__(self) -> None:
         self._drawn_s: collections.deque[float] = collections.deque(maxlen=KEPT)
-        self._since_s = 0.0  # when the first of these was drawn
+        self._since_s: float | None = None  # when the first was drawn
         self._is_slow = False
 
     def count(self, now_s: float | None = None) -> None:
         """Count one that is drawn, at an instant of our monotonic clock."""
         now_s = time.monotonic() if now_s is None else now_s
-        if self._drawn_s and now_s - self._drawn_s[-1] > PAUSE_S:
-            self._drawn_s.clear()  # this computer slept, or the window was hidden
-        if not self._drawn_s:
-            self._since_s = now_s
+        self._since_s = now_s if self._since_s is None else self._since_s
         self._drawn_s.append(now_s)
         rate, is_settled = self.per_second, now_s - self._since_s >= SETTLES_S
         self._is_slow = is_settled and rate is not None and rate < (FAST if self._is_slow else SLOW)

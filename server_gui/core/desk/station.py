@@ -294,8 +294,8 @@ class Station:
             self.tell(NewsKind.WARNING, news.text)
             self.flags.add(Flag(news.cause.prediction.stamp_ns, news.text, FlagKind.RULE))
         if isinstance(news, Endangered):
-            is_new = before is None or not before.came_ns  # that of before a lost link is told again
-            level = Level.NONE if before is None or is_new else before.said.verdict.level
+            # What was so before a lost link, since when nobody has said it, is told again.
+            level = Level.NONE if before is None or not before.came_ns else before.said.verdict.level
             if (happened := turn(level, news.verdict)) is not None:
                 self.tell(NewsKind.WARNING, happened)
                 self.flags.add(Flag(news.verdict.stamp_ns, happened, FlagKind.DANGER))
