@@ -63,9 +63,9 @@ from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.reverted_trials import RevertedTrials
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
+from server_gui.core.tuning.trial_ends import TrialEnds
 from server_gui.core.tuning.writing import WriteProgress, written_line
 
-NOT_DONE: Final = {"keep": "NOT kept", "revert": "NOT taken back"}
 WATCH_NS: Final = 200_000_000  # between looks for news
 
 
@@ -116,6 +116,7 @@ class Station:
         self._happened = FlagWatch()
         self._alarm_news = AlarmNews(self.tell)
         self.reverted = RevertedTrials(self.robot, self.writing, self.tell)
+        self._trial_ends = TrialEnds(commands, deliver, self.writing, self.reverted, self.tell)
         self._others = WritesOfOthers(self.robot, self.tell)
         self._resetting = Resetting(commands, deliver, self.robot, self.stopping, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
@@ -423,38 +424,11 @@ class Station:
 
     def keep_trial(self) -> None:
         """Make what is on trial stay."""
-        if self.writing.trial is not None:
-            self._decide(self._commands.confirm(self.writing.trial.write), lambda _: self._kept(), "keep")
+        self._trial_ends.keep()
 
     def end_trial(self) -> None:
         """Take back what is on trial, now."""
-        if self.writing.trial is not None:
-            before = self.writing.trial.before
-            self._decide(
-                self._commands.revert(self.writing.trial.write),
-                lambda _: self.reverted.began(before),
-                "revert",
-            )
-
-    def _decide(self, future: "Future[Result]", done: Callable[[Result], None], what: str) -> None:
-        """Ask for the end of a trial; where that fails, it is said where its countdown is.
-
-        An answer that comes when another one is on trial, or something else was asked of it since, is told.
-        """
-        trial, number = self.writing.trial, self.writing.asked()
-
-        def answered(result: Result) -> None:
-            if self.writing.trial is trial:
-                done(result)
-            else:
-                self.tell(NewsKind.PARAMETER, f"{what}: answered late, of a trial before")
-
-        def failed(error: Exception) -> None:
-            self.tell(NewsKind.WARNING, f"{what}: {error}")
-            if self.writing.trial is trial and number == self.writing.asks:
-                self.writing.not_done(NOT_DONE[what], str(error))
-
-        when_done(future, self._deliver, answered, failed)
+        self._trial_ends.take_back()
 
     def stage_undo(self) -> None:
         """Stage the inverse of the latest write, to be reviewed and written like any edit."""
@@ -463,10 +437,6 @@ class Station:
                 self.edits.stage(name, value, self.robot.parameters.get(name))
             for name in self.edits.vanished(self.known):
                 self.tell(NewsKind.WARNING, f"{name} is not undone: the robot no longer lets it be written")
-
-    def _kept(self) -> None:
-        self.writing.kept()
-        self.tell(NewsKind.PARAMETER, self.writing.text)
 
     def store(self, *components: str) -> None:
         """Make devices keep their parameters over a reset, one after another."""
